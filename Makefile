@@ -1,0 +1,41 @@
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+.PHONY: run test test-all check bench clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make run       fly two emulated mock-ups (Ctrl-C ends it)"
+	@echo "make test      the default tests"
+	@echo "make test-all  the slow tests too"
+	@echo "make check     format, lint, types, import contracts"
+	@echo "make bench     measure what docs/benchmarks.md reports"
+
+$(STAMP): pyproject.toml tools/requirements.lock
+	@echo "Creating .venv (once) ..."
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $(STAMP)
+
+run: $(STAMP)
+	@$(BIN)/groundstation run examples/rigs/two_mock_ups.toml
+
+test: $(STAMP)
+	@$(BIN)/python -m pytest -q -n 2
+
+test-all: $(STAMP)
+	@$(BIN)/python -m pytest -q -n 2 -m "not hardware"
+
+check: $(STAMP)
+	@$(BIN)/ruff format --check .
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+bench: $(STAMP)
+	@$(BIN)/python tools/bench.py
+
+clean:
+	@rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

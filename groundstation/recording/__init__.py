@@ -1,0 +1,1 @@
+"""MCAP recordings: writer, reader, recovery."""

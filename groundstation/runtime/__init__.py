@@ -1,0 +1,1 @@
+"""Runners, node table, rig files, launcher and supervision."""
