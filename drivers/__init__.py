@@ -1,0 +1,1 @@
+"""Devices on the mock-ups and in the laboratory: one folder per role."""

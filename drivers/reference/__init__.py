@@ -1,0 +1,1 @@
+"""Poses measured from outside: a motion-capture system, or the emulator's truth."""

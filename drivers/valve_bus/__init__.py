@@ -1,0 +1,1 @@
+"""The valves of every vehicle on one CAN bus: wire format, guard, port."""
