@@ -1,0 +1,42 @@
+"""What every controller is: the one interface that nodes and contract tests know."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Protocol
+
+from groundstation.control.state import ControlState, Goal, Wrench
+
+NO_NEIGHBOURS: Mapping[str, ControlState] = MappingProxyType({})
+
+
+class Controller(Protocol):
+    """State and goal in, wrench out."""
+
+    def reset(self) -> None:
+        """Forget the past: at arming, and whenever another source had the valves for long."""
+
+    def update(
+        self,
+        state: ControlState,
+        goal: Goal,
+        dt_s: float,
+        *,
+        applied: Wrench | None = None,
+        neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
+    ) -> Wrench:
+        """The wrench for the coming span.
+
+        Args:
+            state: Newest estimate, table frame.
+            goal: Where to be.
+            dt_s: Time since the last update; the first one may state the nominal period.
+            applied: Mean wrench that acted since the last update, where it is known (delivered pulses, zero
+                while disarmed); None means the wrench returned last.
+            neighbours: Newest states of other mock-ups by name; leave out those that are stale.
+
+        Returns:
+            A wrench that the valves can make, body axes.
+
+        Raises:
+            ValueError: `dt_s` is not positive and finite.
+        """

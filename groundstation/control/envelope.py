@@ -1,0 +1,95 @@
+"""The set of wrenches that valves can make: a zonotope, held as its facets.
+
+Every duty vector 0 <= u <= 1 gives the wrench B u, so the set is the sum of the segments from 0 to each
+column of B. Its facets are normal to the cross products of two columns (G. M. Ziegler, Lectures on
+Polytopes, 1995, section 7.3); along a normal n it reaches h(n) = sum of the positive n . b.
+"""
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.control.state import Wrench
+from groundstation.control.vehicle import VehicleModel
+
+_PARALLEL = 1e-9  # of unit normals: two columns closer than this span no facet
+
+
+class WrenchEnvelope:
+    """Says whether a wrench can be made, and shortens one that cannot.
+
+    Raises:
+        ValueError: The valves cannot push in every direction and turn both ways.
+    """
+
+    def __init__(self, vehicle: VehicleModel) -> None:
+        columns = vehicle.effectiveness().T
+        self._normals, self._reach = _facets(columns)
+        self.max_torque_nm = min(self._scale((0.0, 0.0, side), 1e9) for side in (1.0, -1.0))
+        """Torque that can be made either way with no force."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+        self.max_force_n = min(
+            self._scale((float(np.cos(angle)), float(np.sin(angle)), 0.0), 1e9) for angle in angles
+        )
+        """Force that can be made in the weakest direction with no torque."""
+
+    def saturate(self, wrench: Wrench) -> Wrench:
+        """The nearest makeable wrench that keeps signs and directions; torque is served first.
+
+        Heading goes first because a mock-up that loses its heading pushes in wrong directions; force then
+        keeps its direction and gives up length.
+        """
+        (force_x, force_y), torque = wrench.force_body_n, wrench.torque_nm
+        along = self._normals @ (force_x, force_y, torque)
+        if (along <= self._reach).all():
+            return wrench
+        torque = min(max(torque, -self.max_torque_nm), self.max_torque_nm)
+        largest = max(abs(force_x), abs(force_y))
+        if largest == 0.0:
+            return Wrench((0.0, 0.0), torque)
+        # scaled by its largest component first: products of huge demands would overflow
+        unit_x, unit_y = force_x / largest, force_y / largest
+        left = self._reach - self._normals[:, 2] * torque
+        scale = min(largest, _first_hit(self._normals[:, :2] @ (unit_x, unit_y), left))
+        return Wrench((unit_x * scale, unit_y * scale), torque)
+
+    def contains(self, wrench: Wrench, tolerance_n: float = 1e-9) -> bool:
+        """Whether some duties between 0 and 1 make this wrench."""
+        along = self._normals @ (*wrench.force_body_n, wrench.torque_nm)
+        return bool((along <= self._reach + tolerance_n).all())
+
+    def _scale(self, direction: tuple[float, float, float], limit: float) -> float:
+        return min(limit, _first_hit(self._normals @ direction, self._reach))
+
+
+def _first_hit(slope: NDArray[np.float64], room: NDArray[np.float64]) -> float:
+    """How far one can go when each facet comes nearer by `slope` a unit and `room` is left."""
+    nearing = slope > _PARALLEL
+    if not nearing.any():
+        return np.inf
+    return max(0.0, float((room[nearing] / slope[nearing]).min()))
+
+
+def _facets(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Outward unit normals (m, 3) and reach (m,) of the zonotope of the columns (n, 3)."""
+    normals: list[NDArray[np.float64]] = []
+    for first, second in itertools.combinations(columns, 2):
+        normal = np.cross(first, second)
+        length = float(np.linalg.norm(normal))
+        if length <= _PARALLEL * float(np.linalg.norm(first) * np.linalg.norm(second)):
+            continue
+        for candidate in (normal / length, -normal / length):
+            if not any(np.allclose(candidate, known, atol=_PARALLEL) for known in normals):
+                normals.append(candidate)
+    if not normals:
+        raise ValueError("the valves all push along one line: no plane motion can be controlled with them")
+    stacked = np.array(normals)
+    reach = np.maximum(stacked @ columns.T, 0.0).sum(axis=1)
+    if (reach <= _PARALLEL).any():
+        blind = stacked[int(np.argmin(reach))]
+        raise ValueError(
+            "the valves cannot push in every direction and turn both ways: nothing acts along "
+            f"(force x, force y, torque) = {np.round(blind, 3).tolist()}"
+        )
+    return stacked, reach

@@ -1,0 +1,112 @@
+"""What a controller reads and writes: where the mock-up is, where it should be, what should push it.
+
+Tuples of floats rather than arrays: the law runs on three axes, and an array of two costs more than its sums.
+"""
+
+import math
+from dataclasses import dataclass
+
+Vector2 = tuple[float, float]
+"""Two components along x and y of the frame that the name says."""
+
+
+def rotate(vector: Vector2, angle_rad: float) -> Vector2:
+    """Turn a vector counter-clockwise; body to table with the heading, table to body with its negative."""
+    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
+    return cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]
+
+
+def limit_length(vector: Vector2, limit: float) -> Vector2:
+    """The vector itself, or one of the same direction that is `limit` long."""
+    length = math.hypot(*vector)
+    if length <= limit:
+        return vector
+    scale = limit / length
+    return vector[0] * scale, vector[1] * scale
+
+
+def _refuse_non_finite(what: str, *values: float) -> None:
+    if not math.isfinite(math.fsum(map(abs, values))) and not all(map(math.isfinite, values)):
+        raise ValueError(f"{what} must be finite, found {values}")
+
+
+@dataclass(frozen=True, slots=True)
+class ControlState:
+    """Estimated state of one mock-up at one moment.
+
+    Attributes:
+        position_table_m: Centre of mass, (x, y).
+        velocity_table_m_s: Of the centre of mass, (x, y).
+        heading_rad: Counter-clockwise from table +x to body +x, any branch.
+        rate_rad_s: Turn rate, counter-clockwise positive.
+        slope_table_m_s2: Acceleration that the table is known to add here (slope map), (x, y).
+
+    Raises:
+        ValueError: A component is not finite.
+    """
+
+    position_table_m: Vector2
+    velocity_table_m_s: Vector2
+    heading_rad: float
+    rate_rad_s: float
+    slope_table_m_s2: Vector2 = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _refuse_non_finite(
+            "state",
+            *self.position_table_m,
+            *self.velocity_table_m_s,
+            self.heading_rad,
+            self.rate_rad_s,
+            *self.slope_table_m_s2,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Pose to reach or to follow, with what is known of its motion.
+
+    Attributes:
+        position_table_m: Where the centre of mass should be, (x, y).
+        heading_rad: Where body +x should point.
+        velocity_table_m_s: Velocity of that point.
+        rate_rad_s: Rate of that heading.
+        acceleration_table_m_s2: Acceleration of that point, fed forward.
+        angular_acceleration_rad_s2: Acceleration of that heading, fed forward.
+
+    Raises:
+        ValueError: A component is not finite.
+    """
+
+    position_table_m: Vector2
+    heading_rad: float
+    velocity_table_m_s: Vector2 = (0.0, 0.0)
+    rate_rad_s: float = 0.0
+    acceleration_table_m_s2: Vector2 = (0.0, 0.0)
+    angular_acceleration_rad_s2: float = 0.0
+
+    def __post_init__(self) -> None:
+        _refuse_non_finite(
+            "goal",
+            *self.position_table_m,
+            self.heading_rad,
+            *self.velocity_table_m_s,
+            self.rate_rad_s,
+            *self.acceleration_table_m_s2,
+            self.angular_acceleration_rad_s2,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench:
+    """Force through the centre of mass, body axes, and torque about the vertical."""
+
+    force_body_n: Vector2
+    torque_nm: float
+
+    def __post_init__(self) -> None:
+        _refuse_non_finite("wrench", *self.force_body_n, self.torque_nm)
+
+
+NO_WRENCH = Wrench((0.0, 0.0), 0.0)
+"""Nothing pushes."""

@@ -1,0 +1,167 @@
+"""Station keeping: hold or follow a moving pose with on-off valves on a table that is never quite level.
+
+LQR feedback on position and heading, with velocity from `DisturbanceObserver`, whose disturbance estimate is
+fed forward. Feedback that is smaller than what the estimate's own noise causes would only burn gas, so it is
+shrunk by a dead band (soft, so that the law has no step); the disturbance is paid for in full.
+"""
+
+import math
+from collections.abc import Mapping
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from groundstation.control.allocation import Allocator
+from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.gains import lqr_gains
+from groundstation.control.observer import DisturbanceObserver
+from groundstation.control.state import (
+    NO_WRENCH,
+    ControlState,
+    Goal,
+    Vector2,
+    Wrench,
+    limit_length,
+    rotate,
+)
+from groundstation.control.vehicle import VehicleModel
+from groundstation.frames import wrap_angle
+
+SPEED_BOUND = 1e3  # m/s or rad/s: keeps sums finite whatever comes in; nothing on a table is faster
+LENGTH_BOUND_M = 1e6  # the same for positions
+LONGEST_SPAN_S = 1.0  # after a longer gap the observer takes the measurement as it is
+
+
+class StationConfig(BaseModel):
+    """Weights and limits of station keeping.
+
+    Attributes:
+        position_error_m: Error that is worth `acceleration_m_s2` (LQR weights), likewise for heading.
+        largest_error_m: Errors beyond count as this much, which bounds the speed of the way back.
+        position_deadband_m: Error that asks for no feedback.
+        observer_rad_s: Poles of the velocity and disturbance observers.
+        largest_slope_m_s2: Largest disturbance believed.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    position_error_m: float = Field(0.010, gt=0.0)
+    acceleration_m_s2: float = Field(0.010, gt=0.0)
+    largest_error_m: float = Field(0.10, gt=0.0)
+    position_deadband_m: float = Field(0.001, ge=0.0)
+    observer_rad_s: float = Field(0.6, gt=0.0)
+    largest_slope_m_s2: float = Field(0.010, ge=0.0)
+    heading_error_deg: float = Field(0.5, gt=0.0)
+    angular_acceleration_deg_s2: float = Field(0.5, gt=0.0)
+    largest_heading_error_deg: float = Field(10.0, gt=0.0)
+    heading_deadband_deg: float = Field(0.05, ge=0.0)
+    heading_observer_rad_s: float = Field(1.5, gt=0.0)
+    largest_disturbance_torque_nm: float = Field(0.010, ge=0.0)
+
+
+class StationKeeping:
+    """Controller row ``station``; also the inner law of the others."""
+
+    def __init__(self, config: StationConfig, vehicle: VehicleModel) -> None:
+        self._config = config
+        self._vehicle = vehicle
+        self._envelope = Allocator(vehicle).envelope
+        self._gains = lqr_gains(config.position_error_m, config.acceleration_m_s2)
+        self._heading_gains = lqr_gains(
+            math.radians(config.heading_error_deg), math.radians(config.angular_acceleration_deg_s2)
+        )
+        self._heading_limit_rad = math.radians(config.largest_heading_error_deg)
+        self._deadband_m_s2 = config.position_deadband_m * self._gains.stiffness_per_s2
+        self._heading_deadband_rad_s2 = (
+            math.radians(config.heading_deadband_deg) * self._heading_gains.stiffness_per_s2
+        )
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget disturbances and velocities."""
+        config = self._config
+        slope, turn = config.largest_slope_m_s2, config.largest_disturbance_torque_nm
+        self._x = DisturbanceObserver(config.observer_rad_s, slope)
+        self._y = DisturbanceObserver(config.observer_rad_s, slope)
+        self._turn = DisturbanceObserver(config.heading_observer_rad_s, turn / self._vehicle.inertia_kg_m2)
+        self._last = NO_WRENCH
+
+    @property
+    def disturbance_table_m_s2(self) -> Vector2:
+        """Acceleration found beyond valves and known slope, (x, y)."""
+        return self._x.disturbance, self._y.disturbance
+
+    def update(
+        self,
+        state: ControlState,
+        goal: Goal,
+        dt_s: float,
+        *,
+        applied: Wrench | None = None,
+        neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
+    ) -> Wrench:
+        """See `Controller.update`; neighbours are not looked at."""
+        if not (math.isfinite(dt_s) and dt_s > 0.0):
+            raise ValueError(f"dt_s must be above 0, found {dt_s}")
+        self._observe(state, self._last if applied is None else applied, min(dt_s, LONGEST_SPAN_S))
+        force = rotate(self._force_table_n(state, goal), -wrap_angle(state.heading_rad))
+        self._last = self._envelope.saturate(Wrench(force, self._torque_nm(state, goal)))
+        return self._last
+
+    def _observe(self, state: ControlState, applied: Wrench, dt_s: float) -> None:
+        mass_kg = self._vehicle.mass_kg
+        push = rotate(self._envelope.saturate(applied).force_body_n, wrap_angle(state.heading_rad))
+        torque_nm = self._envelope.saturate(applied).torque_nm
+        slope = _bounded(state.slope_table_m_s2, SPEED_BOUND)
+        speed = _bounded(state.velocity_table_m_s, SPEED_BOUND)
+        self._x.update(speed[0], push[0] / mass_kg + slope[0], dt_s)
+        self._y.update(speed[1], push[1] / mass_kg + slope[1], dt_s)
+        rate = _clamp(state.rate_rad_s, SPEED_BOUND)
+        self._turn.update(rate, torque_nm / self._vehicle.inertia_kg_m2, dt_s)
+
+    def _force_table_n(self, state: ControlState, goal: Goal) -> Vector2:
+        here = _bounded(state.position_table_m, LENGTH_BOUND_M)
+        there = _bounded(goal.position_table_m, LENGTH_BOUND_M)
+        wanted = _bounded(goal.velocity_table_m_s, SPEED_BOUND)
+        forward = _bounded(goal.acceleration_table_m_s2, SPEED_BOUND)
+        slope = _bounded(state.slope_table_m_s2, SPEED_BOUND)
+        error = limit_length((there[0] - here[0], there[1] - here[1]), self._config.largest_error_m)
+        stiffness, damping = self._gains.stiffness_per_s2, self._gains.damping_per_s
+        feedback = _shrink(
+            (
+                stiffness * error[0] + damping * (wanted[0] - self._x.speed),
+                stiffness * error[1] + damping * (wanted[1] - self._y.speed),
+            ),
+            self._deadband_m_s2,
+        )
+        mass_kg = self._vehicle.mass_kg
+        return (
+            mass_kg * (feedback[0] + forward[0] - slope[0] - self._x.disturbance),
+            mass_kg * (feedback[1] + forward[1] - slope[1] - self._y.disturbance),
+        )
+
+    def _torque_nm(self, state: ControlState, goal: Goal) -> float:
+        # each angle is wrapped first: the difference of two huge ones would lose the heading
+        error = wrap_angle(wrap_angle(goal.heading_rad) - wrap_angle(state.heading_rad))
+        feedback = self._heading_gains.stiffness_per_s2 * _clamp(error, self._heading_limit_rad)
+        wanted = _clamp(goal.rate_rad_s, SPEED_BOUND)
+        feedback += self._heading_gains.damping_per_s * (wanted - self._turn.speed)
+        feedback = math.copysign(max(0.0, abs(feedback) - self._heading_deadband_rad_s2), feedback)
+        forward = _clamp(goal.angular_acceleration_rad_s2, SPEED_BOUND)
+        return self._vehicle.inertia_kg_m2 * (feedback + forward - self._turn.disturbance)
+
+
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+def _bounded(vector: Vector2, limit: float) -> Vector2:
+    return _clamp(vector[0], limit), _clamp(vector[1], limit)
+
+
+def _shrink(vector: Vector2, deadband: float) -> Vector2:
+    """The vector, shorter by the dead band; zero inside it."""
+    length = math.hypot(*vector)
+    if length <= deadband:
+        return 0.0, 0.0
+    scale = 1.0 - deadband / length
+    return vector[0] * scale, vector[1] * scale
