@@ -1,1 +1,1 @@
-"""Devices on the mock-ups and in the laboratory: one folder per role."""
+"""Drivers: one folder per device role. They know no bus, no table frame and no other device."""
