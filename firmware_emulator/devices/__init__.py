@@ -1,0 +1,1 @@
+"""Devices: truth to bytes, pictures and CAN frames; CAN frames to forces."""
