@@ -1,0 +1,89 @@
+"""The 22 error states of the filter: what they mean, how they start and how they age.
+
+Notation: theta heading, v and p velocity and position of the IMU point in the table frame, w rate, f specific
+force at the IMU point in body axes, R(theta) = table_from_body. Between packets
+
+    w = (omega - b_g - k_g dT)(1 - s_g)        f = (I - M)(a - b_a - k_a dT)
+    theta' = w        v' = R(theta) f + slope + wave        p' = v
+
+Slope and wave are added because an accelerometer does not feel the slope it glides down. Tracking the IMU
+point instead of the centre of mass keeps the gyro from being differentiated.
+The error of an estimate is true minus nominal, additive in every component.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.fusion.noise import NoiseModel
+
+Array = NDArray[np.float64]
+
+THETA = 0
+VX, VY = 1, 2
+PX, PY = 3, 4
+GYRO_BIAS = 5
+ACC_BIAS_X, ACC_BIAS_Y = 6, 7
+SLOPE_X, SLOPE_Y = 8, 9
+GYRO_SCALE = 10
+LEVER_X, LEVER_Y = 11, 12
+WAVE_X, WAVE_Y = 13, 14
+ACC_MATRIX = 15  # xx, xy, yx, yy of M
+GYRO_TEMPCO = 19
+ACC_TEMPCO_X, ACC_TEMPCO_Y = 20, 21
+SIZE = 22
+MOVING = 5
+"""The first five states move with the packets; the others are constants or slow walks."""
+
+
+def initial_state(noise: NoiseModel) -> Array:
+    """Return the nominal state (22,) before any measurement."""
+    x = np.zeros(SIZE)
+    x[LEVER_X] = noise.imu_offset_x_m
+    x[LEVER_Y] = noise.imu_offset_y_m
+    x[GYRO_TEMPCO] = noise.gyro_tempco_rad_s_c
+    x[ACC_TEMPCO_X] = x[ACC_TEMPCO_Y] = noise.acc_tempco_m_s2_c
+    return x
+
+
+def initial_variance(noise: NoiseModel) -> Array:
+    """Return the variances (22,) before any measurement; pose and velocity are zero, a fix sets them."""
+    sigma = np.zeros(SIZE)
+    sigma[GYRO_BIAS] = noise.gyro_bias_sigma_rad_s
+    sigma[ACC_BIAS_X : ACC_BIAS_Y + 1] = noise.acc_bias_sigma_m_s2
+    sigma[SLOPE_X : SLOPE_Y + 1] = noise.slope_sigma_m_s2
+    sigma[GYRO_SCALE] = noise.gyro_scale_sigma
+    sigma[LEVER_X : LEVER_Y + 1] = noise.imu_offset_sigma_m
+    sigma[WAVE_X : WAVE_Y + 1] = noise.waviness_sigma_m_s2
+    sigma[ACC_MATRIX : ACC_MATRIX + 4] = noise.acc_scale_sigma
+    sigma[GYRO_TEMPCO] = noise.tempco_sigma_ratio * abs(noise.gyro_tempco_rad_s_c)
+    sigma[ACC_TEMPCO_X : ACC_TEMPCO_Y + 1] = noise.tempco_sigma_ratio * abs(noise.acc_tempco_m_s2_c)
+    return sigma**2
+
+
+def move(P: Array, F: Array, Q: Array) -> None:
+    """Carry the covariance P (22, 22) over a segment in place, given its five moving rows."""
+    rows = F @ P
+    corner = rows @ F.T + Q
+    P[:MOVING] = rows
+    P[:, :MOVING] = rows.T
+    P[:MOVING, :MOVING] = 0.5 * (corner + corner.T)
+
+
+def age(x: Array, P: Array, duration_s: float, travelled_m: float, noise: NoiseModel) -> None:
+    """Let biases walk and the local slope be forgotten with the distance travelled, in place.
+
+    The slope is a field over the table, not a process in time: a vehicle that hovers keeps what it learned.
+    """
+    P[GYRO_BIAS, GYRO_BIAS] += noise.gyro_bias_walk_rad_s_rts**2 * duration_s
+    walked = noise.acc_bias_walk_m_s2_rts**2 * duration_s
+    P[ACC_BIAS_X, ACC_BIAS_X] += walked
+    P[ACC_BIAS_Y, ACC_BIAS_Y] += walked
+    keep = float(np.exp(-travelled_m / noise.waviness_length_m))
+    x[WAVE_X : WAVE_Y + 1] *= keep
+    P[WAVE_X : WAVE_Y + 1] *= keep
+    P[:, WAVE_X : WAVE_Y + 1] *= keep
+    fresh = noise.waviness_sigma_m_s2**2 * (1.0 - keep * keep)
+    P[WAVE_X, WAVE_X] += fresh
+    P[WAVE_Y, WAVE_Y] += fresh

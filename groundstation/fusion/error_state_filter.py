@@ -1,0 +1,252 @@
+"""The default estimator: an error-state filter that takes each late fix at its exposure.
+
+The nominal state runs ahead packet by packet in plain floats (`Reckoner`). The covariance stays at the last
+used exposure, the checkpoint, and moves only when a fix comes: checkpoint -> exposure over the stored
+packets, correction there, then the packets since the exposure are integrated again up to now.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from groundstation.fusion import error_state as es
+from groundstation.fusion import measurements
+from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.flight import fly, moving_noise, transition
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.reckoner import Reckoner
+
+STEP_S = 1.0
+"""Longest stretch over which the local slope is held; an outage is covered in several."""
+REOPENED_VELOCITY_M_S = 0.1
+"""Sigma of the velocity after the filter found itself lost: faster than anything flies on a table."""
+MAX_AHEAD_S = 1.0
+"""A fix whose exposure is further ahead of the packets has a wrong stamp."""
+WAITS = "waits for packets"
+
+
+class ErrorStateFilter:
+    """Heading, position, velocity, biases, slope, scale and lever arm from packets and late fixes.
+
+    Args:
+        noise: sensors and table of this mock-up.
+    """
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self.noise = noise
+        self.counters = Counters()
+        self.x = es.initial_state(noise)
+        """(22,) nominal state at the checkpoint."""
+        self.P = np.diag(es.initial_variance(noise))
+        """(22, 22) covariance there."""
+        self._reckoner = Reckoner(noise, self.counters)
+        self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
+        self._confirmed = False
+        self._rests: list[tuple[float, float]] = []
+        self._refused: list[tuple[float, Array]] = []
+        self._waiting: list[Fix] = []
+        self._accounts: list[FixAccount] = []
+
+    def begin_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle stands still."""
+        self._reckoner.start_clock(t_ns)
+        if not (self._rests and math.isinf(self._rests[-1][1])):
+            self._note_rest((self._seconds(t_ns), math.inf))
+
+    def end_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle may move."""
+        if self._rests and math.isinf(self._rests[-1][1]):
+            self._note_rest((self._rests.pop()[0], self._seconds(t_ns)))
+            self._integrate_to_now()
+
+    def _note_rest(self, rest: tuple[float, float]) -> None:
+        self._rests.append(rest)
+        self._reckoner.rest_from_s, self._reckoner.rest_to_s = rest
+
+    def add_imu(self, packet: ImuPacket) -> PlanarState | None:
+        """Integrate one packet; None before the first fix, or when the packet was refused."""
+        reckoner = self._reckoner
+        if not reckoner.add(packet):
+            return None
+        if self._waiting:
+            self._retry()
+        return reckoner.report() if reckoner.has_pose else None
+
+    def state(self) -> PlanarState | None:
+        """Return the state after the newest packet."""
+        return self._reckoner.report() if self._reckoner.has_pose else None
+
+    def covariance(self) -> Array:
+        """Return (6, 6) of x, y, heading, vx, vy, omega of the centre of mass now."""
+        x, P = self.x.copy(), self.P.copy()
+        self._propagate(x, P, self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        H = measurements.reported(x, self._reckoner.omega_rad_s)
+        C: Array = H @ P @ H.T
+        C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
+        return C
+
+    def add_fix(self, fix: Fix) -> FixAccount:
+        """Take a fix at its arrival and give account of it."""
+        account = self._judge(fix)
+        if account.reason == WAITS:
+            self._waiting.append(fix)
+        return account
+
+    def settled(self) -> list[FixAccount]:
+        """Hand over the accounts of fixes that had to wait for packets."""
+        accounts, self._accounts = self._accounts, []
+        return accounts
+
+    def _retry(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for fix in waiting:
+            account = self._judge(fix)
+            if account.reason == WAITS:
+                self._waiting.append(fix)
+            else:
+                self._accounts.append(account)
+
+    def _judge(self, fix: Fix) -> FixAccount:
+        if not np.isfinite([fix.x_m, fix.y_m, fix.heading_rad, *fix.cov.flat]).all():
+            return self._refuse(fix, "not finite")
+        reckoner = self._reckoner
+        t = self._seconds(fix.t_exposure_ns)
+        if reckoner.origin_ns is None or (len(reckoner.history) and t < reckoner.history.first_s):
+            return self._refuse(fix, "before the first packet")
+        if t > reckoner.newest_s + 1e-9:
+            if t > reckoner.newest_s + MAX_AHEAD_S:
+                return self._refuse(fix, "more than a second ahead of the packets")
+            return FixAccount(fix.t_exposure_ns, False, WAITS, math.nan, math.nan, math.nan, math.nan)
+        if not reckoner.has_pose:
+            return self._start(fix, t, "starts the estimate", np.full(3, math.nan))
+        if t <= reckoner.checkpoint_s:
+            return self._refuse(fix, "older than the last used")
+        x, P = self.x.copy(), self.P.copy()
+        self._propagate(x, P, reckoner.checkpoint_s, t)
+        z, H = measurements.predict_fix(fix, x, self._omega_read_at(t), self.noise)
+        S = H @ P @ H.T + fix.cov
+        weight = np.linalg.inv(S)
+        nis = float(z @ weight @ z)
+        if nis > self.noise.gate_nis:
+            return self._contradicted(fix, t, z, nis)
+        K = P @ H.T @ weight
+        x += K @ z
+        P -= K @ S @ K.T
+        self._confirmed = True
+        reckoner.is_lost = False
+        self._accept(t, x, P)
+        return FixAccount(fix.t_exposure_ns, True, "used", float(z[0]), float(z[1]), float(z[2]), nis)
+
+    def _omega_read_at(self, t_s: float) -> float:
+        if self.noise.gyro_lag_s == 0.0:
+            return 0.0
+        read = self._reckoner.history.between(t_s - self.noise.packet_period_s, t_s).omega_rad_s
+        return float(read.mean()) if len(read) else float(self.x[es.GYRO_BIAS])
+
+    def _refuse(self, fix: Fix, reason: str) -> FixAccount:
+        self.counters.add("fix_" + reason.replace(" ", "_"))
+        return FixAccount(fix.t_exposure_ns, False, reason, math.nan, math.nan, math.nan, math.nan)
+
+    def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
+        """Refuse a fix, or believe it when those before it said the same."""
+        if not self._confirmed:
+            return self._start(fix, t, "contradicts an unconfirmed start", z)
+        self.counters.add("fix_outside_the_gate")
+        self._refused.append((t, z))
+        if len(self._refused) >= self.noise.reopen_after:
+            self._reckoner.is_lost = True
+            if self._refused_agree():
+                return self._start(fix, t, "starts the estimate again", z)
+        return FixAccount(
+            fix.t_exposure_ns, False, "outside the gate", float(z[0]), float(z[1]), float(z[2]), nis
+        )
+
+    def _refused_agree(self) -> bool:
+        """Whether the last refused innovations lie on a straight line in time, as a lost filter's would."""
+        last = self._refused[-self.noise.reopen_after :]
+        t = np.array([r[0] - last[0][0] for r in last])
+        z = np.array([r[1] for r in last])
+        z[:, 2] = np.unwrap(z[:, 2])
+        line = np.polynomial.polynomial.polyfit(t, z, 1)
+        left = np.abs(z - line[0] - np.outer(t, line[1]))
+        sigma = np.array([self.noise.star_sigma_xy_m] * 2 + [self.noise.star_sigma_heading_rad])
+        return bool((left < 6.0 * sigma + 0.02 * np.abs(z).max(axis=0)).all())
+
+    def _start(self, fix: Fix, t: float, reason: str, z: Array) -> FixAccount:
+        """Take the pose from this fix alone."""
+        x, P = self.x.copy(), self.P.copy()
+        rest_from = next((a for a, b in self._rests if a <= t <= b), None)
+        sigma = REOPENED_VELOCITY_M_S if rest_from is None else measurements.REST_VELOCITY_M_S
+        measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
+        if rest_from is not None and not self._reckoner.has_pose:
+            self._learn(x, P, rest_from, t)
+        self._reckoner.has_pose = True
+        self._reckoner.is_lost = True
+        self._confirmed = False
+        self._accept(t, x, P)
+        self.counters.add("fix_" + reason.replace(" ", "_"))
+        return FixAccount(fix.t_exposure_ns, True, reason, float(z[0]), float(z[1]), float(z[2]), math.nan)
+
+    def _accept(self, t: float, x: Array, P: Array) -> None:
+        """Make the corrected state at `t` the checkpoint and integrate from it to now."""
+        self.x, self.P = x, 0.5 * (P + P.T)
+        self._reckoner.checkpoint_s = t
+        self._refused.clear()
+        self._rests = [r for r in self._rests if r[1] > t]
+        self._reckoner.history.forget_before(t)
+        self._integrate_to_now()
+
+    def _propagate(self, x: Array, P: Array, start_s: float, stop_s: float) -> None:
+        """Carry x and P from `start_s` to `stop_s` in place, through flight and rest."""
+        for a, b, resting in self._stretches(start_s, stop_s):
+            if resting:
+                measurements.stand(x, P)
+                self._learn(x, P, a, b)
+                es.age(x, P, b - a, 0.0, self.noise)
+                continue
+            segment = self._reckoner.history.between(a, b)
+            if len(segment.span_s):
+                flight = fly(x, segment, self._lag_difference_s)
+                es.move(P, transition(segment, flight), moving_noise(segment, flight, self.noise))
+                travelled = math.hypot(flight.moved[es.PX] - x[es.PX], flight.moved[es.PY] - x[es.PY])
+                x[: es.MOVING] = flight.moved
+                es.age(x, P, flight.duration_s, travelled, self.noise)
+
+    def _learn(self, x: Array, P: Array, start_s: float, stop_s: float) -> None:
+        segment = self._reckoner.history.between(start_s, stop_s)
+        if not measurements.learn_rest(x, P, segment, self.noise):
+            self.counters.add("rest_disturbed")
+
+    def _stretches(self, start_s: float, stop_s: float) -> list[tuple[float, float, bool]]:
+        """Cut an interval at the ends of rests, and flights into steps; True marks rest."""
+        edges = (edge for rest in self._rests for edge in rest)
+        cuts = [start_s, *(edge for edge in edges if start_s < edge < stop_s), stop_s]
+        out = []
+        for a, b in itertools.pairwise(cuts):
+            if any(begin <= 0.5 * (a + b) <= end for begin, end in self._rests):
+                out.append((a, b, True))
+            else:
+                n = max(1, math.ceil((b - a) / STEP_S))
+                inner = [a + (b - a) * i / n for i in range(n)] + [b]
+                out += [(p, q, False) for p, q in itertools.pairwise(inner)]
+        return out
+
+    def _integrate_to_now(self) -> None:
+        """Run the nominal state from the checkpoint to now, and prepare the reported sigmas."""
+        if not self._reckoner.has_pose:
+            return
+        x = self.x.copy()
+        for a, b, resting in self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s):
+            segment = self._reckoner.history.between(a, b)
+            if resting:
+                x[es.VX : es.VY + 1] = 0.0
+            elif len(segment.span_s):
+                x[: es.MOVING] = fly(x, segment, self._lag_difference_s).moved
+        self._reckoner.load(x, x[: es.MOVING])
+        self._reckoner.variance = measurements.variance_in_time(self.x, self.P, self.noise)
+
+    def _seconds(self, t_ns: int) -> float:
+        return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9

@@ -1,0 +1,126 @@
+"""The contract of every fusion estimator, and the small records that go in and come out.
+
+Stamps are int nanoseconds of one host's monotonic clock. Positions, headings and velocities are those of the
+centre of mass in the table frame; packets are in the body frame at the accelerometers. The records are named
+tuples because a thousand of them a second are made.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.fusion.noise import NoiseModel
+
+Array = NDArray[np.float64]
+
+
+class ImuPacket(NamedTuple):
+    """Mean of the polls of one averaging window, body frame."""
+
+    t_ns: int
+    """End of the window."""
+    dt_s: float
+    """Since the end of the last packet, by the sensor's ticks; over one window where packets were lost."""
+    omega_rad_s: float
+    ax_m_s2: float
+    ay_m_s2: float
+    temperature_c: float
+    """NaN where the block does not send it."""
+
+
+class Fix(NamedTuple):
+    """Pose of the body's origin from one star image."""
+
+    t_exposure_ns: int
+    """Middle of the exposure."""
+    t_arrival_ns: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+    cov: Array
+    """(3, 3) of x, y, heading; m^2, m rad, rad^2."""
+
+
+class PlanarState(NamedTuple):
+    """State of the centre of mass at the end of a packet, table frame."""
+
+    t_ns: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+    """Not wrapped: continuous over turns."""
+    vx_m_s: float
+    vy_m_s: float
+    omega_rad_s: float
+    bias_omega_rad_s: float
+    bias_ax_m_s2: float
+    """To be taken from the accelerometer: its bias minus the slope's gravity in body axes."""
+    bias_ay_m_s2: float
+    std_x_m: float
+    std_y_m: float
+    std_heading_rad: float
+    is_lost: bool
+    """True until two fixes agree, and again when fixes in a row contradict the estimate."""
+
+
+class FixAccount(NamedTuple):
+    """What became of one fix."""
+
+    t_exposure_ns: int
+    used: bool
+    reason: str
+    innovation_x_m: float
+    innovation_y_m: float
+    innovation_heading_rad: float
+    nis: float
+    """Normalised innovation squared, 3 degrees of freedom."""
+
+
+class Counters:
+    """What an estimator met and survived, by name; shown to the operator."""
+
+    __slots__ = ("by_name",)
+
+    def __init__(self) -> None:
+        self.by_name: dict[str, int] = {}
+
+    def add(self, name: str) -> None:
+        """Count one more of `name`."""
+        self.by_name[name] = self.by_name.get(name, 0) + 1
+
+
+class Estimator(Protocol):
+    """IMU packets and late fixes in, state of the centre of mass out; no clock of its own."""
+
+    counters: Counters
+
+    def begin_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle stands still (landed, or held)."""
+
+    def end_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle may move."""
+
+    def add_imu(self, packet: ImuPacket) -> PlanarState | None:
+        """Take one packet; None as long as no fix has given a pose, or when the packet was refused."""
+
+    def add_fix(self, fix: Fix) -> FixAccount:
+        """Take a fix, at its arrival."""
+
+    def settled(self) -> list[FixAccount]:
+        """Hand over the accounts of fixes that had to wait for packets, once each."""
+
+    def state(self) -> PlanarState | None:
+        """Return the state after the newest packet."""
+
+    def covariance(self) -> Array:
+        """Return (6, 6) of x, y, heading, vx, vy, omega at the newest packet, centre of mass."""
+
+
+class EstimatorFactory(Protocol):
+    """How a row of the table of estimators is made."""
+
+    def __call__(self, noise: NoiseModel) -> Estimator:
+        """Return a fresh estimator."""

@@ -1,0 +1,180 @@
+"""What a fix and a rest say about the error states."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.fusion import error_state as es
+from groundstation.fusion.estimator import Fix
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.packet_history import Segment
+
+Array = NDArray[np.float64]
+
+REST_VELOCITY_M_S = 1e-6
+"""Sigma of a landed vehicle's velocity: none, but not singular."""
+MIN_REST_PACKETS = 4
+MAX_REST_SPREAD = 2.5
+"""A rest whose readings spread wider than this many sigmas of the white noise was not one."""
+
+
+def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) -> tuple[Array, Array]:
+    """Return innovation (3,) of x, y, heading and its Jacobian (3, 22) at the exposure.
+
+    The star camera sees the body's origin now; the state is the IMU point's, seen through the sensors'
+    low-pass filters. For a first-order filter the lag is undone exactly: heading + lag * rate, p + lag * v.
+
+    Args:
+        fix: pose of the body's origin.
+        x: (22,) nominal state at the exposure.
+        omega_read_rad_s: the gyro's reading at the exposure; used only with a lag.
+        noise: lags.
+    """
+    H = np.zeros((3, es.SIZE))
+    w = omega_read_rad_s - x[es.GYRO_BIAS]
+    theta = x[es.THETA] + noise.gyro_lag_s * w
+    c, s = math.cos(theta), math.sin(theta)
+    rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
+    lx, ly = c * rx - s * ry, s * rx + c * ry
+    lag = noise.acc_lag_s
+    z = np.array(
+        [
+            fix.x_m - (x[es.PX] + lag * x[es.VX] - lx),
+            fix.y_m - (x[es.PY] + lag * x[es.VY] - ly),
+            math.remainder(fix.heading_rad - theta, math.tau),
+        ]
+    )
+    H[0, es.PX] = H[1, es.PY] = H[2, es.THETA] = 1.0
+    H[0, es.VX] = H[1, es.VY] = lag
+    H[0, es.THETA], H[1, es.THETA] = ly, -lx
+    H[0, es.LEVER_X], H[0, es.LEVER_Y] = -c, s
+    H[1, es.LEVER_X], H[1, es.LEVER_Y] = -s, -c
+    H[2, es.GYRO_BIAS] = -noise.gyro_lag_s
+    return z, H
+
+
+def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_sigma_m_s: float) -> None:
+    """Set pose and velocity from one fix alone, in place; what is known of biases and table stays.
+
+    Args:
+        fix: pose of the body's origin.
+        x: (22,) nominal state.
+        P: (22, 22) covariance.
+        near_heading_rad: the heading is unwrapped to lie within half a turn of this.
+        velocity_sigma_m_s: how fast the vehicle may be; the velocity is set to zero.
+    """
+    c, s = math.cos(fix.heading_rad), math.sin(fix.heading_rad)
+    rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
+    lx, ly = c * rx - s * ry, s * rx + c * ry
+    x[es.THETA] = near_heading_rad + math.remainder(fix.heading_rad - near_heading_rad, math.tau)
+    x[es.VX : es.VY + 1] = 0.0
+    x[es.PX], x[es.PY] = fix.x_m + lx, fix.y_m + ly
+    P[: es.MOVING] = 0.0
+    P[:, : es.MOVING] = 0.0
+    order = [es.PX, es.PY, es.THETA]
+    P[np.ix_(order, order)] = fix.cov
+    P[es.VX, es.VX] = P[es.VY, es.VY] = velocity_sigma_m_s**2
+    arm = np.eye(es.SIZE)  # the fix is of the body's origin: errors of heading and lever move the IMU point
+    arm[es.PX, es.THETA], arm[es.PY, es.THETA] = -ly, lx
+    arm[es.PX, es.LEVER_X], arm[es.PX, es.LEVER_Y] = c, -s
+    arm[es.PY, es.LEVER_X], arm[es.PY, es.LEVER_Y] = s, c
+    P[:] = arm @ P @ arm.T
+
+
+def stand(x: Array, P: Array) -> None:
+    """Stop the vehicle in place: velocity zero, as known as can be."""
+    v = slice(es.VX, es.VY + 1)
+    x[v] = 0.0
+    P[v] = 0.0
+    P[:, v] = 0.0
+    P[es.VX, es.VX] = P[es.VY, es.VY] = REST_VELOCITY_M_S**2
+
+
+def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> bool:
+    """Correct biases and slope in place by the mean of packets at rest.
+
+    At rest the accelerometers read bias - R(heading)^T slope, the gyro its bias.
+
+    Returns:
+        False, and nothing changed, if the readings spread too wide for a rest.
+    """
+    good = segment.is_hole == 0.0
+    n = int(good.sum())
+    if n < MIN_REST_PACKETS:
+        return True
+    readings = np.array([segment.omega_rad_s[good], segment.ax_m_s2[good], segment.ay_m_s2[good]])
+    density = np.array(
+        [noise.gyro_density_rad_s_rthz, noise.acc_density_m_s2_rthz, noise.acc_density_m_s2_rthz]
+    )
+    sigma = density / math.sqrt(noise.packet_period_s)
+    if (readings.std(axis=1) > MAX_REST_SPREAD * sigma).any():
+        return False
+    warmth = float(segment.warmth_k[good].mean())
+    c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
+    gx, gy = x[es.SLOPE_X] + x[es.WAVE_X], x[es.SLOPE_Y] + x[es.WAVE_Y]
+    H = np.zeros((3, es.SIZE))
+    H[0, es.GYRO_BIAS], H[0, es.GYRO_TEMPCO] = 1.0, warmth
+    H[1, es.ACC_BIAS_X], H[1, es.ACC_TEMPCO_X] = 1.0, warmth
+    H[2, es.ACC_BIAS_Y], H[2, es.ACC_TEMPCO_Y] = 1.0, warmth
+    for k in (es.SLOPE_X, es.WAVE_X):
+        H[1, k], H[1, k + 1] = -c, -s
+        H[2, k], H[2, k + 1] = s, -c
+    expected = np.array(
+        [
+            x[es.GYRO_BIAS] + x[es.GYRO_TEMPCO] * warmth,
+            x[es.ACC_BIAS_X] + x[es.ACC_TEMPCO_X] * warmth - (c * gx + s * gy),
+            x[es.ACC_BIAS_Y] + x[es.ACC_TEMPCO_Y] * warmth - (c * gy - s * gx),
+        ]
+    )
+    S = H @ P @ H.T + np.diag(sigma**2 / n)
+    K = np.linalg.solve(S, H @ P).T
+    x += K @ (readings.mean(axis=1) - expected)
+    P -= K @ S @ K.T
+    return True
+
+
+def reported(x: Array, omega_rad_s: float) -> Array:
+    """Return the Jacobian (6, 22) of x, y, heading, vx, vy, omega of the centre of mass."""
+    H = np.zeros((6, es.SIZE))
+    c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
+    rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
+    lx, ly = c * rx - s * ry, s * rx + c * ry
+    w = omega_rad_s
+    H[0, es.PX] = H[1, es.PY] = H[2, es.THETA] = H[3, es.VX] = H[4, es.VY] = 1.0
+    H[0, es.THETA], H[1, es.THETA] = ly, -lx
+    H[0, es.LEVER_X], H[0, es.LEVER_Y], H[1, es.LEVER_X], H[1, es.LEVER_Y] = -c, s, -s, -c
+    H[3, es.THETA], H[4, es.THETA] = w * lx, w * ly
+    H[3, es.GYRO_BIAS], H[4, es.GYRO_BIAS] = -ly, lx
+    H[3, es.LEVER_X], H[3, es.LEVER_Y] = w * s, w * c
+    H[4, es.LEVER_X], H[4, es.LEVER_Y] = -w * c, w * s
+    H[5, es.GYRO_BIAS], H[5, es.GYRO_SCALE] = -1.0, -w
+    return H
+
+
+def variance_in_time(x: Array, P: Array, noise: NoiseModel) -> list[float]:
+    """Return polynomial coefficients of the variances of x, y (five each) and heading (three).
+
+    The argument is the time in s since P held. The error of a position grows as p + v t + a t^2 / 2 with the
+    constant error a of biases and slope, plus white noise; evaluating that costs a microsecond where carrying
+    a covariance would cost a hundred.
+    """
+    c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
+    L = np.zeros((6, es.SIZE))
+    L[[0, 1, 2, 3]] = reported(x, 0.0)[[0, 1, 3, 4]]
+    L[2:4] = 0.0
+    L[2, es.VX] = L[3, es.VY] = 1.0
+    L[4, es.ACC_BIAS_X], L[4, es.ACC_BIAS_Y] = -c, s
+    L[5, es.ACC_BIAS_X], L[5, es.ACC_BIAS_Y] = -s, -c
+    L[4, [es.SLOPE_X, es.WAVE_X]] = 1.0
+    L[5, [es.SLOPE_Y, es.WAVE_Y]] = 1.0
+    C = L @ P @ L.T
+    white = noise.acc_density_m_s2_rthz**2 / 3.0
+    out: list[float] = []
+    for p, v, a in ((0, 2, 4), (1, 3, 5)):
+        out += [C[p, p], 2.0 * C[p, v], C[v, v] + C[p, a], C[v, a] + white, C[a, a] / 4.0]
+    g = es.GYRO_BIAS
+    out += [P[0, 0], noise.gyro_density_rad_s_rthz**2 - 2.0 * P[0, g], P[g, g]]
+    return [float(value) for value in out]

@@ -1,0 +1,86 @@
+"""What a fusion estimator must be told about the sensors, the table and their errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseModel:
+    """Error model of one mock-up's IMU and star tracker; every figure comes from rig or calibration.
+
+    White noise is given as a density, so that the rate of the packets does not matter. Sigmas are one
+    standard deviation of what calibration has left over, at the start of a run.
+    """
+
+    packet_period_s: float
+    """Averaging window of one IMU packet."""
+    gyro_density_rad_s_rthz: float
+    """White rate noise, averaged over packets (angle random walk in rad/sqrt(s))."""
+    acc_density_m_s2_rthz: float
+    """White acceleration noise (velocity random walk in m/s/sqrt(s))."""
+    star_sigma_xy_m: float
+    star_sigma_heading_rad: float
+
+    imu_offset_x_m: float = 0.0
+    """Accelerometers from the centre of mass, body frame."""
+    imu_offset_y_m: float = 0.0
+    imu_offset_sigma_m: float = 1e-3
+
+    gyro_bias_sigma_rad_s: float = 0.9
+    """Before a rest: the null of the data sheet, +-50 deg/s."""
+    acc_bias_sigma_m_s2: float = 0.15
+    gyro_bias_walk_rad_s_rts: float = 1.2e-5
+    acc_bias_walk_m_s2_rts: float = 1.6e-5
+    gyro_tempco_rad_s_c: float = 0.0
+    """Slope of the gyro's null with temperature; a data sheet value is right to `tempco_sigma_ratio`."""
+    acc_tempco_m_s2_c: float = 0.0
+    tempco_sigma_ratio: float = 0.5
+    gyro_scale_sigma: float = 2e-3
+    acc_scale_sigma: float = 1e-2
+    """Of the accelerometers' scale and of the angles between their axes and the body's."""
+
+    slope_sigma_m_s2: float = 5e-3
+    """Mean tilt of the table as gravity along it (9.8 mm/s^2 per mrad)."""
+    waviness_sigma_m_s2: float = 2.5e-4
+    """Local departure from the mean slope."""
+    waviness_length_m: float = 0.25
+    """Distance after which the local slope has lost all but 1/e of its memory."""
+
+    gyro_lag_s: float = 0.0
+    """Time constant of the gyro's low-pass, 1 / (2 pi f)."""
+    acc_lag_s: float = 0.0
+    max_acc_step_m_s2: float = 0.09
+    """Largest honest change between packets; the valves' largest force, twice, plus noise."""
+    max_rate_step_rad_s: float = math.radians(2.0)
+    gate_nis: float = 25.0
+    """Fixes whose normalised innovation squared (3 degrees of freedom) is above are refused."""
+    reopen_after: int = 4
+    """Refused fixes in a row that agree with each other prove the filter, not the fixes, wrong."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            "packet_period_s", "gyro_density_rad_s_rthz", "acc_density_m_s2_rthz",
+            "star_sigma_xy_m", "star_sigma_heading_rad", "waviness_length_m",
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                msg = f"{name} must be a positive number, got {value!r}"
+                raise ValueError(msg)
+
+
+def packet_density(poll_sigma: float, lsb: float, poll_rate_hz: float) -> float:
+    """Return the white noise density of means of quantised polls.
+
+    Args:
+        poll_sigma: one sigma of one poll before quantisation.
+        lsb: quantisation step, in the same unit; its error is taken as uniform.
+        poll_rate_hz: polls per second, all of them averaged into packets.
+    """
+    return math.sqrt((poll_sigma**2 + lsb**2 / 12.0) / poll_rate_hz)
+
+
+def lag_of_bandwidth(bandwidth_hz: float) -> float:
+    """Return the time constant in s of a first-order low-pass; 0 Hz stands for none."""
+    return 0.0 if bandwidth_hz <= 0.0 else 1.0 / (2.0 * math.pi * bandwidth_hz)

@@ -1,0 +1,56 @@
+"""Wild packets: one that jumps away and back is not motion."""
+
+from __future__ import annotations
+
+from groundstation.fusion.noise import NoiseModel
+
+
+class PacketScreen:
+    """Holds back a packet that differs too much from the last good one, unless the next agrees with it.
+
+    A valve or a push lasts several packets and is believed at the second; a flipped bit or a loose plug does
+    not. The limits are the rig's: largest force and torque over mass and inertia, plus noise.
+    """
+
+    __slots__ = ("_last", "_max_acc", "_max_rate", "_suspect")
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self._max_acc = noise.max_acc_step_m_s2
+        self._max_rate = noise.max_rate_step_rad_s
+        self._last: tuple[float, float, float] | None = None
+        self._suspect: tuple[float, float, float] | None = None
+
+    def forget(self) -> None:
+        """Believe the next packet whatever it is."""
+        self._last = self._suspect = None
+
+    def is_wild(self, omega: float, ax: float, ay: float) -> bool:
+        """Return whether the packet shall not be integrated; NaN and infinity are wild."""
+        last = self._last
+        if last is None:
+            # differences with itself are NaN for NaN and infinity, and NaN is not <= 0
+            if omega - omega <= 0.0 and ax - ax <= 0.0 and ay - ay <= 0.0:
+                self._last = (omega, ax, ay)
+                return False
+            return True
+        rate, force = self._max_rate, self._max_acc
+        if (
+            -rate <= omega - last[0] <= rate
+            and -force <= ax - last[1] <= force
+            and -force <= ay - last[2] <= force
+        ):
+            self._last = (omega, ax, ay)
+            self._suspect = None
+            return False
+        suspect = self._suspect
+        if (
+            suspect is not None
+            and -rate <= omega - suspect[0] <= rate
+            and -force <= ax - suspect[1] <= force
+            and -force <= ay - suspect[2] <= force
+        ):
+            self._last = (omega, ax, ay)
+            self._suspect = None
+            return False
+        self._suspect = (omega, ax, ay)
+        return True

@@ -1,0 +1,223 @@
+"""The published method: a late fix replaces the pose at its exposure, the packets since are integrated again.
+
+As published for planar air-bearing mock-ups with a slow star tracker: zero offsets from the mean at rest,
+gates on impossible readings, integration in the table frame, velocity from the difference of two fixes, and
+one least-squares fit of the constant offsets (mu, nu) over the first stretch of flight. It knows no wrong
+fixes, no slope and no covariance; it is the baseline that the default filter is compared with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.offset_fit import fit_offsets
+from groundstation.fusion.packet_history import PacketHistory, Segment
+
+MAX_ACC_M_S2 = 0.5
+"""Published anomaly gate."""
+MAX_RATE_RAD_S = math.radians(50.0)
+"""Published anomaly gate."""
+FIT_STRETCH_S = 20.0
+"""Flight over which the offsets are fitted, once."""
+
+
+class ReintegrationEstimator:
+    """Delay-compensated dead reckoning from the newest fix.
+
+    Args:
+        noise: lever arm and the fixes' sigma, which is all that is known of the errors.
+    """
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self.noise = noise
+        self.counters = Counters()
+        self._history = PacketHistory()
+        self._origin_ns: int | None = None
+        self._t_ns = 0
+        self._rest_from: float | None = None
+        self._flight_from: float | None = None
+        self._offsets = np.zeros(3)  # omega, mu, nu
+        self._is_fitted = False
+        self._fixes: list[tuple[float, float, float, float]] = []  # exposure, IMU point x, y, heading
+        self._pose: list[float] | None = None  # theta, vx, vy, px, py of the IMU point
+        self._omega = 0.0
+        self._last = (0.0, 0.0, 0.0)
+        self._waiting: list[Fix] = []
+        self._accounts: list[FixAccount] = []
+
+    def begin_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle stands still."""
+        self._start_clock(t_ns)
+        self._rest_from = self._seconds(t_ns)
+        self._flight_from = None
+
+    def end_rest(self, t_ns: int) -> None:
+        """Take the mean of the rest as the zero offsets."""
+        if self._rest_from is None:
+            return
+        end = self._seconds(t_ns)
+        rest = self._history.between(self._rest_from, end)
+        if len(rest.span_s):
+            self._offsets = np.array([rest.omega_rad_s.mean(), rest.ax_m_s2.mean(), rest.ay_m_s2.mean()])
+        self._rest_from, self._flight_from, self._is_fitted = None, end, False
+
+    def add_imu(self, packet: ImuPacket) -> PlanarState | None:
+        """Integrate one packet; readings outside the gates are replaced by the last good ones."""
+        self._start_clock(packet.t_ns - round(packet.dt_s * 1e9))
+        if packet.t_ns <= self._t_ns:
+            self.counters.add("packet_stamp_not_after_the_last")
+            return None
+        omega, ax, ay = packet.omega_rad_s, packet.ax_m_s2, packet.ay_m_s2
+        if not (abs(omega) <= MAX_RATE_RAD_S and abs(ax) <= MAX_ACC_M_S2 and abs(ay) <= MAX_ACC_M_S2):
+            self.counters.add("packet_outside_the_gates")
+            omega, ax, ay = self._last
+        self._last = (omega, ax, ay)
+        self._t_ns = packet.t_ns
+        t = self._seconds(packet.t_ns)
+        self._history.rows.extend((t, packet.dt_s, omega, ax, ay, 0.0, 0.0))
+        for fix in self._waiting:
+            self._accounts.append(self.add_fix(fix))
+        self._waiting.clear()
+        if self._pose is None:
+            return None
+        if self._rest_from is None:
+            self._integrate(packet.dt_s, omega, ax, ay)
+        return self.state()
+
+    def _integrate(self, dt: float, omega: float, ax: float, ay: float) -> None:
+        theta, vx, vy, px, py = self._pose or [0.0] * 5
+        w = omega - float(self._offsets[0])
+        fx, fy = ax - float(self._offsets[1]), ay - float(self._offsets[2])
+        middle = theta + 0.5 * w * dt
+        c, s = math.cos(middle), math.sin(middle)
+        gx, gy = c * fx - s * fy, s * fx + c * fy
+        self._pose = [
+            theta + w * dt,
+            vx + gx * dt,
+            vy + gy * dt,
+            px + (vx + 0.5 * gx * dt) * dt,
+            py + (vy + 0.5 * gy * dt) * dt,
+        ]
+        self._omega = w
+
+    def state(self) -> PlanarState | None:
+        """Return the state after the newest packet."""
+        if self._pose is None:
+            return None
+        theta, vx, vy, px, py = self._pose
+        lx, ly = self._lever(theta)
+        w = self._omega
+        bias, mu, nu = self._offsets.tolist()
+        xy, heading = self.noise.star_sigma_xy_m, self.noise.star_sigma_heading_rad
+        return PlanarState(
+            self._t_ns,
+            px - lx,
+            py - ly,
+            theta,
+            vx + w * ly,
+            vy - w * lx,
+            w,
+            bias,
+            mu,
+            nu,
+            xy,
+            xy,
+            heading,
+            False,
+        )
+
+    def covariance(self) -> Array:
+        """Return (6, 6) with the fixes' variances; the method knows nothing else."""
+        C = np.full((6, 6), math.nan)
+        xy, heading = self.noise.star_sigma_xy_m**2, self.noise.star_sigma_heading_rad**2
+        C[:3, :3] = np.diag([xy, xy, heading])
+        return C
+
+    def settled(self) -> list[FixAccount]:
+        """Hand over the accounts of fixes that had to wait for packets."""
+        accounts, self._accounts = self._accounts, []
+        return accounts
+
+    def add_fix(self, fix: Fix) -> FixAccount:
+        """Put the vehicle where the fix saw it, and integrate the packets since."""
+        t = self._seconds(fix.t_exposure_ns)
+        if not all(map(math.isfinite, (fix.x_m, fix.y_m, fix.heading_rad))):
+            return self._account(fix, "not finite")
+        if self._origin_ns is None or not len(self._history) or t < self._history.first_s:
+            return self._account(fix, "before the first packet")
+        if t > self._seconds(self._t_ns) + 1e-9:
+            self._waiting.append(fix)
+            return self._account(fix, "waits for packets")
+        if self._fixes and t <= self._fixes[-1][0]:
+            return self._account(fix, "older than the last used")
+        near = self._pose[0] if self._pose else 0.0
+        heading = near + math.remainder(fix.heading_rad - near, math.tau)
+        lx, ly = self._lever(heading)
+        self._fixes.append((t, fix.x_m + lx, fix.y_m + ly, heading))
+        resting = self._flight_from is None or t <= self._flight_from
+        if not resting and not self._is_fitted and t > (self._flight_from or 0.0) + FIT_STRETCH_S:
+            self._fit()
+        velocity = (0.0, 0.0) if resting else self._finite_difference()
+        self._pose = [heading, *velocity, fix.x_m + lx, fix.y_m + ly]
+        start = t if not resting else max(t, self._flight_from or math.inf)
+        segment = self._history.between(start, self._seconds(self._t_ns))
+        for dt, w, ax, ay in zip(*self._columns(segment), strict=True):
+            self._integrate(dt, w, ax, ay)
+        if self._is_fitted:
+            self._history.forget_before(t)
+            self._fixes = self._fixes[-2:]
+        return self._account(fix, "used")
+
+    def _finite_difference(self) -> tuple[float, float]:
+        if len(self._fixes) < 2:
+            return 0.0, 0.0
+        (t0, x0, y0, _), (t1, x1, y1, _) = self._fixes[-2:]
+        return (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
+
+    def _fit(self) -> None:
+        """Fit (mu, nu) over the flight so far, once."""
+        self._is_fitted = True
+        flight = [f for f in self._fixes if f[0] > (self._flight_from or 0.0)]
+        if len(flight) < 4:
+            self.counters.add("too_few_fixes_for_the_offset_fit")
+            return
+        t = np.array([f[0] for f in flight])
+        segment = self._history.between(t[0] - 0.1, t[-1])
+        step = (segment.omega_rad_s - self._offsets[0]) * segment.span_s
+        turned = np.cumsum(step)
+        heading = flight[0][3] + turned - np.interp(t[0], segment.end_s, turned) - 0.5 * step
+        force = np.array([segment.ax_m_s2, segment.ay_m_s2])
+        points = np.array([[f[1] for f in flight], [f[2] for f in flight]])
+        fit = fit_offsets(segment.end_s, segment.span_s, heading, force, t, points)
+        self._offsets[1:] = fit.mu_m_s2, fit.nu_m_s2
+
+    @staticmethod
+    def _columns(segment: Segment) -> list[list[float]]:
+        return [
+            segment.span_s.tolist(),
+            segment.omega_rad_s.tolist(),
+            segment.ax_m_s2.tolist(),
+            segment.ay_m_s2.tolist(),
+        ]
+
+    def _account(self, fix: Fix, reason: str) -> FixAccount:
+        if reason != "used":
+            self.counters.add("fix_" + reason.replace(" ", "_"))
+        nan = math.nan
+        return FixAccount(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan)
+
+    def _lever(self, theta: float) -> tuple[float, float]:
+        c, s = math.cos(theta), math.sin(theta)
+        rx, ry = self.noise.imu_offset_x_m, self.noise.imu_offset_y_m
+        return c * rx - s * ry, s * rx + c * ry
+
+    def _start_clock(self, t_ns: int) -> None:
+        if self._origin_ns is None:
+            self._origin_ns = self._t_ns = t_ns
+
+    def _seconds(self, t_ns: int) -> float:
+        return (t_ns - (self._origin_ns or 0)) * 1e-9
