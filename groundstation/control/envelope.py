@@ -10,10 +10,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.control.state import Wrench
+from groundstation.control.state import Wrench, bounded, clamp
 from groundstation.control.vehicle import VehicleModel
 
 _PARALLEL = 1e-9  # of unit normals: two columns closer than this span no facet
+_ABSURD = 1e9  # N or N m: products of larger demands could overflow
 
 
 class WrenchEnvelope:
@@ -26,41 +27,32 @@ class WrenchEnvelope:
     def __init__(self, vehicle: VehicleModel) -> None:
         columns = vehicle.effectiveness().T
         self._normals, self._reach = _facets(columns)
-        self.max_torque_nm = min(self._scale((0.0, 0.0, side), 1e9) for side in (1.0, -1.0))
+        turning = np.abs(self._normals[:, 2])
+        self.max_torque_nm = _first_hit(turning, self._reach)
         """Torque that can be made either way with no force."""
-        angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
-        self.max_force_n = min(
-            self._scale((float(np.cos(angle)), float(np.sin(angle)), 0.0), 1e9) for angle in angles
-        )
-        """Force that can be made in the weakest direction with no torque."""
+        self.max_force_n = _first_hit(np.hypot(self._normals[:, 0], self._normals[:, 1]), self._reach)
+        """Force that can be made in every direction with no torque."""
 
     def saturate(self, wrench: Wrench) -> Wrench:
-        """The nearest makeable wrench that keeps signs and directions; torque is served first.
+        """The wrench, shortened where the valves cannot make it; torque is served first.
 
         Heading goes first because a mock-up that loses its heading pushes in wrong directions; force then
         keeps its direction and gives up length.
         """
-        (force_x, force_y), torque = wrench.force_body_n, wrench.torque_nm
+        force_x, force_y = bounded(wrench.force_body_n, _ABSURD)
+        torque = clamp(wrench.torque_nm, _ABSURD)
         along = self._normals @ (force_x, force_y, torque)
         if (along <= self._reach).all():
             return wrench
-        torque = min(max(torque, -self.max_torque_nm), self.max_torque_nm)
-        largest = max(abs(force_x), abs(force_y))
-        if largest == 0.0:
-            return Wrench((0.0, 0.0), torque)
-        # scaled by its largest component first: products of huge demands would overflow
-        unit_x, unit_y = force_x / largest, force_y / largest
+        torque = clamp(torque, self.max_torque_nm)
         left = self._reach - self._normals[:, 2] * torque
-        scale = min(largest, _first_hit(self._normals[:, :2] @ (unit_x, unit_y), left))
-        return Wrench((unit_x * scale, unit_y * scale), torque)
+        scale = min(1.0, _first_hit(self._normals[:, :2] @ (force_x, force_y), left))
+        return Wrench((force_x * scale, force_y * scale), torque)
 
     def contains(self, wrench: Wrench, tolerance_n: float = 1e-9) -> bool:
         """Whether some duties between 0 and 1 make this wrench."""
         along = self._normals @ (*wrench.force_body_n, wrench.torque_nm)
         return bool((along <= self._reach + tolerance_n).all())
-
-    def _scale(self, direction: tuple[float, float, float], limit: float) -> float:
-        return min(limit, _first_hit(self._normals @ direction, self._reach))
 
 
 def _first_hit(slope: NDArray[np.float64], room: NDArray[np.float64]) -> float:

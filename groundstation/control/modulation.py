@@ -28,11 +28,11 @@ class PulseConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    period_s: float = Field(0.1, ge=0.02, le=0.12)
-    min_on_s: float = Field(0.010, ge=0.001, le=0.05)
-    min_off_s: float = Field(0.010, ge=0.0, le=0.05)
-    open_delay_s: float = Field(0.006, ge=0.0, le=0.05)
-    close_delay_s: float = Field(0.005, ge=0.0, le=0.05)
+    period_s: float = Field(default=0.1, ge=0.02, le=0.12)
+    min_on_s: float = Field(default=0.010, ge=0.001, le=0.05)
+    min_off_s: float = Field(default=0.010, ge=0.0, le=0.05)
+    open_delay_s: float = Field(default=0.006, ge=0.0, le=0.05)
+    close_delay_s: float = Field(default=0.005, ge=0.0, le=0.05)
 
     @model_validator(mode="after")
     def _fits(self) -> "PulseConfig":

@@ -25,6 +25,16 @@ def limit_length(vector: Vector2, limit: float) -> Vector2:
     return vector[0] * scale, vector[1] * scale
 
 
+def clamp(value: float, limit: float) -> float:
+    """The value within +-limit."""
+    return min(max(value, -limit), limit)
+
+
+def bounded(vector: Vector2, limit: float) -> Vector2:
+    """Each component within +-limit."""
+    return clamp(vector[0], limit), clamp(vector[1], limit)
+
+
 def _refuse_non_finite(what: str, *values: float) -> None:
     if not math.isfinite(math.fsum(map(abs, values))) and not all(map(math.isfinite, values)):
         raise ValueError(f"{what} must be finite, found {values}")

@@ -20,6 +20,8 @@ from groundstation.control.state import (
     Goal,
     Vector2,
     Wrench,
+    bounded,
+    clamp,
     limit_length,
     rotate,
 )
@@ -44,18 +46,18 @@ class StationConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    position_error_m: float = Field(0.010, gt=0.0)
-    acceleration_m_s2: float = Field(0.010, gt=0.0)
-    largest_error_m: float = Field(0.10, gt=0.0)
-    position_deadband_m: float = Field(0.001, ge=0.0)
-    observer_rad_s: float = Field(0.6, gt=0.0)
-    largest_slope_m_s2: float = Field(0.010, ge=0.0)
-    heading_error_deg: float = Field(0.5, gt=0.0)
-    angular_acceleration_deg_s2: float = Field(0.5, gt=0.0)
-    largest_heading_error_deg: float = Field(10.0, gt=0.0)
-    heading_deadband_deg: float = Field(0.05, ge=0.0)
-    heading_observer_rad_s: float = Field(1.5, gt=0.0)
-    largest_disturbance_torque_nm: float = Field(0.010, ge=0.0)
+    position_error_m: float = Field(default=0.015, gt=0.0)
+    acceleration_m_s2: float = Field(default=0.010, gt=0.0)
+    largest_error_m: float = Field(default=0.10, gt=0.0)
+    position_deadband_m: float = Field(default=0.0015, ge=0.0)
+    observer_rad_s: float = Field(default=0.45, gt=0.0)
+    largest_slope_m_s2: float = Field(default=0.010, ge=0.0)
+    heading_error_deg: float = Field(default=0.3, gt=0.0)
+    angular_acceleration_deg_s2: float = Field(default=0.5, gt=0.0)
+    largest_heading_error_deg: float = Field(default=10.0, gt=0.0)
+    heading_deadband_deg: float = Field(default=0.05, ge=0.0)
+    heading_observer_rad_s: float = Field(default=0.8, gt=0.0)
+    largest_disturbance_torque_nm: float = Field(default=0.010, ge=0.0)
 
 
 class StationKeeping:
@@ -109,21 +111,21 @@ class StationKeeping:
 
     def _observe(self, state: ControlState, applied: Wrench, dt_s: float) -> None:
         mass_kg = self._vehicle.mass_kg
-        push = rotate(self._envelope.saturate(applied).force_body_n, wrap_angle(state.heading_rad))
-        torque_nm = self._envelope.saturate(applied).torque_nm
-        slope = _bounded(state.slope_table_m_s2, SPEED_BOUND)
-        speed = _bounded(state.velocity_table_m_s, SPEED_BOUND)
+        acted = self._envelope.saturate(applied)
+        push = rotate(acted.force_body_n, wrap_angle(state.heading_rad))
+        slope = bounded(state.slope_table_m_s2, SPEED_BOUND)
+        speed = bounded(state.velocity_table_m_s, SPEED_BOUND)
         self._x.update(speed[0], push[0] / mass_kg + slope[0], dt_s)
         self._y.update(speed[1], push[1] / mass_kg + slope[1], dt_s)
-        rate = _clamp(state.rate_rad_s, SPEED_BOUND)
-        self._turn.update(rate, torque_nm / self._vehicle.inertia_kg_m2, dt_s)
+        rate = clamp(state.rate_rad_s, SPEED_BOUND)
+        self._turn.update(rate, acted.torque_nm / self._vehicle.inertia_kg_m2, dt_s)
 
     def _force_table_n(self, state: ControlState, goal: Goal) -> Vector2:
-        here = _bounded(state.position_table_m, LENGTH_BOUND_M)
-        there = _bounded(goal.position_table_m, LENGTH_BOUND_M)
-        wanted = _bounded(goal.velocity_table_m_s, SPEED_BOUND)
-        forward = _bounded(goal.acceleration_table_m_s2, SPEED_BOUND)
-        slope = _bounded(state.slope_table_m_s2, SPEED_BOUND)
+        here = bounded(state.position_table_m, LENGTH_BOUND_M)
+        there = bounded(goal.position_table_m, LENGTH_BOUND_M)
+        wanted = bounded(goal.velocity_table_m_s, SPEED_BOUND)
+        forward = bounded(goal.acceleration_table_m_s2, SPEED_BOUND)
+        slope = bounded(state.slope_table_m_s2, SPEED_BOUND)
         error = limit_length((there[0] - here[0], there[1] - here[1]), self._config.largest_error_m)
         stiffness, damping = self._gains.stiffness_per_s2, self._gains.damping_per_s
         feedback = _shrink(
@@ -142,20 +144,12 @@ class StationKeeping:
     def _torque_nm(self, state: ControlState, goal: Goal) -> float:
         # each angle is wrapped first: the difference of two huge ones would lose the heading
         error = wrap_angle(wrap_angle(goal.heading_rad) - wrap_angle(state.heading_rad))
-        feedback = self._heading_gains.stiffness_per_s2 * _clamp(error, self._heading_limit_rad)
-        wanted = _clamp(goal.rate_rad_s, SPEED_BOUND)
+        feedback = self._heading_gains.stiffness_per_s2 * clamp(error, self._heading_limit_rad)
+        wanted = clamp(goal.rate_rad_s, SPEED_BOUND)
         feedback += self._heading_gains.damping_per_s * (wanted - self._turn.speed)
         feedback = math.copysign(max(0.0, abs(feedback) - self._heading_deadband_rad_s2), feedback)
-        forward = _clamp(goal.angular_acceleration_rad_s2, SPEED_BOUND)
+        forward = clamp(goal.angular_acceleration_rad_s2, SPEED_BOUND)
         return self._vehicle.inertia_kg_m2 * (feedback + forward - self._turn.disturbance)
-
-
-def _clamp(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
-
-
-def _bounded(vector: Vector2, limit: float) -> Vector2:
-    return _clamp(vector[0], limit), _clamp(vector[1], limit)
 
 
 def _shrink(vector: Vector2, deadband: float) -> Vector2:

@@ -1,0 +1,143 @@
+"""Formation: hold a pose relative to other mock-ups.
+
+Each neighbour says where this mock-up should be: at a fixed offset, either along the table's axes or carried
+by the neighbour's own heading. The setpoint is the weighted mean of these and of the own goal; with one
+neighbour and no goal weight this is leader and follower, with mutual neighbours it is the consensus law for
+relative states with a leader (W. Ren, R. Beard, Distributed Consensus in Multi-vehicle Cooperative Control,
+2008, section 4.2). A neighbour that falls silent drops out of the mean; with none left, the last setpoint is
+held at rest.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.go_to import GoTo, GoToConfig
+from groundstation.control.keep_in import KeepIn
+from groundstation.control.state import (
+    ControlState,
+    Goal,
+    Vector2,
+    Wrench,
+    clamp,
+    limit_length,
+    rotate,
+)
+from groundstation.control.station import LENGTH_BOUND_M, SPEED_BOUND
+from groundstation.control.vehicle import VehicleModel
+from groundstation.frames import wrap_angle
+
+
+class RelativePose(BaseModel):
+    """Where to be relative to one neighbour.
+
+    Attributes:
+        offset_m: This mock-up's position less the neighbour's, (x, y).
+        heading_deg: This mock-up's heading less the neighbour's.
+        carried: The offset is in the neighbour's body axes and turns with it; otherwise in the table's axes,
+            and the heading is that of the goal plus `heading_deg`.
+        weight: Share in the mean.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    offset_m: tuple[float, float]
+    heading_deg: float = 0.0
+    carried: bool = True
+    weight: float = Field(default=1.0, gt=0.0)
+
+
+class FormationConfig(BaseModel):
+    """Neighbours by name, how much the own goal counts, and how to get there."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    neighbours: dict[str, RelativePose] = {}
+    goal_weight: float = Field(default=0.0, ge=0.0)
+    go_to: GoToConfig = GoToConfig()
+
+    @model_validator(mode="after")
+    def _has_something_to_hold(self) -> "FormationConfig":
+        if not self.neighbours and self.goal_weight == 0.0:
+            raise ValueError("a formation needs neighbours, or a goal_weight above 0")
+        return self
+
+
+class Formation:
+    """Controller row ``formation``."""
+
+    def __init__(self, config: FormationConfig, vehicle: VehicleModel, keep_in: KeepIn | None = None) -> None:
+        self._config = config
+        self._go_to = GoTo(config.go_to, vehicle, keep_in)
+        self._held: Goal | None = None
+
+    def reset(self) -> None:
+        """Forget way, disturbances and the last setpoint."""
+        self._go_to.reset()
+        self._held = None
+
+    def update(
+        self,
+        state: ControlState,
+        goal: Goal,
+        dt_s: float,
+        *,
+        applied: Wrench | None = None,
+        neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
+    ) -> Wrench:
+        """See `Controller.update`."""
+        setpoint = self._setpoint(goal, neighbours)
+        if setpoint is None:
+            # never heard of anybody: stay where we are
+            setpoint = self._held or Goal(state.position_table_m, state.heading_rad)
+            setpoint = replace(setpoint, velocity_table_m_s=(0.0, 0.0), rate_rad_s=0.0)
+        self._held = setpoint
+        return self._go_to.update(state, setpoint, dt_s, applied=applied)
+
+    def _setpoint(self, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
+        """Weighted mean of what the neighbours and the goal ask for; None when nobody asks."""
+        asked: list[tuple[float, Goal]] = []
+        if self._config.goal_weight > 0.0:
+            asked.append((self._config.goal_weight, goal))
+        for name, relative in self._config.neighbours.items():
+            if name in neighbours:
+                asked.append((relative.weight, _asked_by(neighbours[name], relative, goal)))
+        if not asked:
+            return None
+        total = math.fsum(weight for weight, _ in asked)
+        shares = [(weight / total, wanted) for weight, wanted in asked]
+        # headings are averaged as small turns from the first, for angles have no mean of their own
+        first_rad = asked[0][1].heading_rad
+        turn_rad = math.fsum(share * wrap_angle(wanted.heading_rad - first_rad) for share, wanted in shares)
+        return Goal(
+            _mean([(share, wanted.position_table_m) for share, wanted in shares], LENGTH_BOUND_M),
+            wrap_angle(first_rad + turn_rad),
+            _mean([(share, wanted.velocity_table_m_s) for share, wanted in shares], SPEED_BOUND),
+            math.fsum(share * wanted.rate_rad_s for share, wanted in shares),
+        )
+
+
+def _asked_by(neighbour: ControlState, relative: RelativePose, goal: Goal) -> Goal:
+    """Pose and velocity that one neighbour asks for."""
+    x, y = neighbour.position_table_m
+    turn_rad = math.radians(relative.heading_deg)
+    if not relative.carried:
+        place = (x + relative.offset_m[0], y + relative.offset_m[1])
+        return Goal(
+            place, wrap_angle(goal.heading_rad) + turn_rad, neighbour.velocity_table_m_s, goal.rate_rad_s
+        )
+    heading_rad = wrap_angle(neighbour.heading_rad)
+    lever = rotate(relative.offset_m, heading_rad)
+    rate = clamp(neighbour.rate_rad_s, SPEED_BOUND)
+    velocity = neighbour.velocity_table_m_s
+    carried = (velocity[0] - rate * lever[1], velocity[1] + rate * lever[0])
+    return Goal((x + lever[0], y + lever[1]), heading_rad + turn_rad, carried, rate)
+
+
+def _mean(shares: list[tuple[float, Vector2]], limit: float) -> Vector2:
+    x = math.fsum(share * value[0] for share, value in shares)
+    y = math.fsum(share * value[1] for share, value in shares)
+    return limit_length((x, y), limit)
