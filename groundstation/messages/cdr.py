@@ -18,6 +18,7 @@ from groundstation.messages.base import Message
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
+_MAX_PADDING = 3  # DDS may round a serialised payload up to four bytes
 
 _PRIMITIVES = {
     "bool": ("?", 1),
@@ -161,6 +162,8 @@ class Codec(Generic[M]):
             raise CodecError(f"{self._cls.__name__}: {len(data)} bytes do not fit the layout") from error
         if position > len(data):
             raise CodecError(f"{self._cls.__name__}: cut off after {len(data)} bytes")
+        if len(data) - position > _MAX_PADDING:
+            raise CodecError(f"{self._cls.__name__}: {len(data) - position} bytes too many")
         return self._build(*values)
 
 

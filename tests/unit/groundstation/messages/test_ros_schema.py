@@ -1,0 +1,42 @@
+"""The definition texts against rosbags' own copies of the ROS 2 packages."""
+
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from groundstation.bus.topics import TOPICS
+from groundstation.messages import definitions as m
+from groundstation.messages.ros_schema import is_standard, message_text, register, schema_text
+
+CLASSES = [topic.payload for topic in TOPICS]
+
+
+@pytest.mark.parametrize("cls", [m.StarImage, m.Wrench])
+@pytest.mark.parametrize("store", [Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY, Stores.LATEST])
+def test_standard_types_are_worded_as_ros_words_them(cls, store):
+    # ros_version: rosbags writes ROS 1 text by default
+    expected, _ = get_typestore(store).generate_msgdef(cls.ROS_TYPE, ros_version=2)
+    assert is_standard(cls)
+    assert schema_text(cls) == expected
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_generated_text_is_what_rosbags_makes_of_the_registered_type(cls):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    register(store, CLASSES)
+    expected, _ = store.generate_msgdef(cls.ROS_TYPE, ros_version=2)
+    assert schema_text(cls) == expected
+
+
+def test_the_header_stands_first_and_carries_the_vehicle():
+    assert message_text(m.StarFix).splitlines()[:3] == [
+        "std_msgs/Header header",
+        "bool fix",
+        "float64 x_m",
+    ]
+    assert "string frame_id" in schema_text(m.StarFix)
+
+
+def test_every_payload_class_has_a_type_name_of_its_own():
+    names = [cls.ROS_TYPE for cls in CLASSES]
+    assert len(set(names)) == len(names)
+    assert all(name.count("/msg/") == 1 for name in names)
