@@ -1,0 +1,214 @@
+"""Reads a finished recording lazily, in the order of its log times.
+
+The index at the end of the file says which chunks hold which channels; chunks are unpacked one at a
+time, so that a recording of any length is read in little memory.
+"""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import ChunkIndex
+from mcap.summary import Summary
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.topics import Topic
+from groundstation.messages.base import Message
+from groundstation.messages.cdr import CodecError
+from groundstation.recording.channels import parse_channel
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import METADATA_NAME, RecordingInfo
+from groundstation.recording.records import (
+    MESSAGE,
+    RECORD,
+    DamagedChunkError,
+    Opcode,
+    complete_records,
+    read_chunk,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """One recorded message, not yet decoded.
+
+    Attributes:
+        envelope: Topic, owner, sequence and moment of publication; what the publisher's clock measured
+            (``wall_ns``, ``cpu_ns``, causes) stands in the journal.
+        data: CDR bytes of the payload.
+        log_ns: Log time.
+    """
+
+    envelope: Envelope
+    data: bytes
+    log_ns: int
+
+    @property
+    def payload(self) -> Message:
+        """The payload, decoded anew at each call; CodecError if the bytes are no such payload."""
+        return self.envelope.topic.codec.decode(self.data)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedChannel:
+    """A channel and how much it holds."""
+
+    topic: Topic
+    owner: str
+    count: int
+
+
+class Recording:
+    """A finished recording. Use it as a context manager.
+
+    Args:
+        path: An ``.mcap`` file.
+
+    Attributes:
+        info: What the recording says about itself.
+        channels: Channels of the topic table, in the order of the table, then by owner.
+        start_ns: First log time, 0 if empty.
+        stop_ns: Last log time, 0 if empty.
+
+    Raises:
+        RecordingError: There is no such file, it is no MCAP file, or it was never finished.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be opened: {error.strerror}") from error
+        try:
+            self._summary, self.info = self._open()
+        except RecordingError:
+            self._file.close()
+            raise
+        statistics = self._summary.statistics
+        counts = statistics.channel_message_counts if statistics is not None else {}
+        self.start_ns = statistics.message_start_time if statistics is not None else 0
+        self.stop_ns = statistics.message_end_time if statistics is not None else 0
+        self._known: dict[int, tuple[Topic, str]] = {}
+        found = []
+        for number, channel in self._summary.channels.items():
+            parsed = parse_channel(channel.topic)
+            if parsed is not None and channel.message_encoding == "cdr":
+                self._known[number] = parsed
+                found.append(RecordedChannel(*parsed, counts.get(number, 0)))
+        self.channels = tuple(sorted(found, key=lambda channel: (channel.topic.index, channel.owner)))
+
+    def has(self, topic: Topic, owner: str) -> bool:
+        """Whether anything of this topic of this owner was recorded."""
+        return any(c.topic is topic and c.owner == owner and c.count for c in self.channels)
+
+    def messages(
+        self,
+        topics: Collection[Topic] | None = None,
+        owners: Collection[str] | None = None,
+        start_ns: int | None = None,
+        stop_ns: int | None = None,
+    ) -> Iterator[Recorded]:
+        """Messages in log order; equal log times in the order of the file.
+
+        Args:
+            topics: Only these; None for all.
+            owners: Only of these vehicles or processes; None for all.
+            start_ns: From this log time on.
+            stop_ns: Before this log time.
+
+        Raises:
+            RecordingError: A chunk of the file is damaged.
+        """
+        wanted = {
+            number: (topic, owner)
+            for number, (topic, owner) in self._known.items()
+            if (topics is None or topic in topics) and (owners is None or owner in owners)
+        }
+        low = 0 if start_ns is None else start_ns
+        high = 1 << 64 if stop_ns is None else stop_ns
+        chunks = [
+            index
+            for index in self._summary.chunk_indexes
+            if index.message_end_time >= low
+            and index.message_start_time < high
+            and (not index.message_index_offsets or not wanted.keys().isdisjoint(index.message_index_offsets))
+        ]
+        chunks.sort(key=lambda index: (index.message_start_time, index.chunk_start_offset))
+        pending: list[Recorded] = []
+        for position, index in enumerate(chunks):
+            pending.extend(m for m in self._chunk(index, wanted) if low <= m.log_ns < high)
+            pending.sort(key=lambda message: message.log_ns)
+            if position + 1 == len(chunks):
+                yield from pending
+                return
+            following_ns = chunks[position + 1].message_start_time
+            ready = sum(1 for message in pending if message.log_ns < following_ns)
+            yield from pending[:ready]
+            del pending[:ready]
+
+    def delivered(
+        self, topics: Collection[Topic] | None = None, owners: Collection[str] | None = None
+    ) -> Iterator[Delivered]:
+        """Decoded messages in log order.
+
+        Raises:
+            RecordingError: A payload or a chunk of the file is damaged.
+        """
+        for message in self.messages(topics, owners):
+            try:
+                yield Delivered(message.envelope, message.payload)
+            except CodecError as error:
+                raise RecordingError(f"{self.path}: {error}") from error
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open(self) -> tuple[Summary, RecordingInfo]:
+        try:
+            reader = SeekingReader(self._file)
+        except (McapError, EOFError, ValueError) as error:
+            raise RecordingError(f"{self.path} is no MCAP file") from error
+        try:
+            summary = reader.get_summary()
+            metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        except (McapError, EOFError, ValueError, OSError) as error:
+            raise RecordingError(
+                f"{self.path} was not finished or is damaged: try `groundstation recording recover`"
+            ) from error
+        if summary is None:
+            raise RecordingError(f"{self.path} has no index: try `groundstation recording recover`")
+        return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {}))
+
+    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str]]) -> Iterator[Recorded]:
+        self._file.seek(index.chunk_start_offset + RECORD.size)
+        chunk = read_chunk(self._file.read(index.chunk_length - RECORD.size))
+        try:
+            if chunk is None or not chunk.complete:
+                raise DamagedChunkError("a chunk is cut off")
+            data = chunk.unpack()
+        except DamagedChunkError as error:
+            raise RecordingError(f"{self.path}: {error}: try `groundstation recording recover`") from error
+        for opcode, start, stop in complete_records(data):
+            if opcode == Opcode.MESSAGE:
+                number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, start)
+                key = wanted.get(number)
+                if key is not None:
+                    yield Recorded(
+                        Envelope(key[0], key[1], sequence, publish_ns),
+                        data[start + MESSAGE.size : stop],
+                        log_ns,
+                    )

@@ -1,0 +1,164 @@
+"""Recovery of a recording whose recorder was killed: all that can be read goes into a new, indexed file.
+
+The file is walked from the front. Complete chunks are unpacked; of the chunk at the torn end, the blocks
+that its compressor had finished are unpacked too. A damaged chunk in the middle is counted and skipped.
+"""
+
+import mmap
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from groundstation.recording import records
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.records import DamagedChunkError, Opcode
+from groundstation.recording.software import software
+from groundstation.recording.writer import CHUNK_BYTES
+
+
+@dataclass(slots=True)
+class Recovery:
+    """What was found.
+
+    Attributes:
+        messages: Messages brought over.
+        torn_bytes: Bytes at the end of the file that are no whole record.
+        damaged_chunks: Complete chunks that could not be unpacked; their messages are lost.
+        orphans: Messages lost because the name of their channel stood in a damaged chunk.
+        was_finished: The file had been finished properly.
+    """
+
+    messages: int = 0
+    torn_bytes: int = 0
+    damaged_chunks: int = 0
+    orphans: int = 0
+    was_finished: bool = False
+
+
+def recover(source: Path, target: Path) -> Recovery:
+    """Write all messages and metadata that are readable in ``source`` into ``target``.
+
+    Args:
+        source: A torn recording, usually ``….mcap.part``; it is left as it is.
+        target: The new file; it appears only once it is complete.
+
+    Raises:
+        RecordingError: The source cannot be read or is no MCAP file, or the target is already there.
+    """
+    if target.exists():
+        raise RecordingError(f"{target} is already there: recordings are never overwritten")
+    temporary = target.with_name(target.name + ".recovering")
+    try:
+        with source.open("rb") as file:
+            data = _mapped(file, source)
+            with data, temporary.open("wb") as out:
+                recovery = _Copy(Writer(out, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)).run(
+                    data
+                )
+            temporary.replace(target)
+    except OSError as error:
+        raise RecordingError(f"{error.filename or target}: {error.strerror}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+    return recovery
+
+
+def _mapped(file: BinaryIO, source: Path) -> mmap.mmap:
+    if file.read(len(records.MAGIC)) != records.MAGIC:
+        raise RecordingError(f"{source} is no MCAP file, or was torn before its first record")
+    return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+class _Copy:
+    """Carries records over; numbers of schemas and channels are given anew."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._found = Recovery()
+        self._schemas: dict[int, records.Schema] = {}
+        self._channels: dict[int, records.Channel] = {}
+        self._new_schemas: dict[int, int] = {}
+        self._new_channels: dict[int, int] = {}
+
+    def run(self, data: mmap.mmap) -> Recovery:
+        profile = "ros2"
+        whole = list(records.complete_records(data, len(records.MAGIC)))
+        if whole and whole[0].opcode == Opcode.HEADER:
+            profile, _ = records.read_header(data[whole[0].start : whole[0].stop])
+        self._writer.start(profile=profile, library=f"{software()} recover")
+        for record in whole:  # an index at the end, if there is one, names channels of damaged chunks too
+            if record.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+                self._define(record.opcode, data[record.start : record.stop])
+        end = len(records.MAGIC)
+        for opcode, start, end in whole:
+            if opcode == Opcode.DATA_END:
+                break
+            self._take(opcode, data[start:end])
+        else:
+            self._tail(data[end:])
+        self._found.was_finished = data[-len(records.MAGIC) :] == records.MAGIC and len(whole) > 1
+        self._writer.finish()  # type: ignore[no-untyped-call]  # unannotated in mcap
+        return self._found
+
+    def _take(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.CHUNK:
+            try:
+                chunk = records.read_chunk(content)
+                if chunk is None or not chunk.complete:
+                    raise DamagedChunkError("a chunk is shorter than it says")
+                self._inside(chunk.unpack())
+            except (ValueError, struct.error):
+                self._found.damaged_chunks += 1
+        elif opcode == Opcode.METADATA:
+            self._writer.add_metadata(*records.read_metadata(content))
+        elif opcode == Opcode.MESSAGE:
+            self._message(content)
+
+    def _tail(self, rest: bytes) -> None:
+        """The record that was being written when the recorder was killed."""
+        self._found.torn_bytes = len(rest)
+        if rest[:1] == bytes([Opcode.CHUNK]):
+            chunk = records.read_chunk(rest[records.RECORD.size :])
+            if chunk is not None:
+                try:
+                    self._inside(chunk.unpack_what_is_there())
+                except (ValueError, struct.error):
+                    self._found.damaged_chunks += 1
+
+    def _inside(self, data: bytes) -> None:
+        for opcode, start, stop in records.complete_records(data):
+            if opcode == Opcode.MESSAGE:
+                self._message(data[start:stop])
+            elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+                self._define(opcode, data[start:stop])
+
+    def _define(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = records.read_schema(content)
+            self._schemas[schema.number] = schema
+        else:
+            channel = records.read_channel(content)
+            self._channels[channel.number] = channel
+
+    def _message(self, content: bytes) -> None:
+        number, sequence, log_ns, publish_ns = records.MESSAGE.unpack_from(content)
+        channel = self._new_channels.get(number)
+        if channel is None:
+            known = self._channels.get(number)
+            if known is None:
+                self._found.orphans += 1
+                return
+            channel = self._new_channels[number] = self._register(known)
+        self._writer.add_message(channel, log_ns, content[records.MESSAGE.size :], publish_ns, sequence)
+        self._found.messages += 1
+
+    def _register(self, channel: records.Channel) -> int:
+        schema = self._new_schemas.get(channel.schema, 0)
+        if schema == 0 and channel.schema in self._schemas:
+            known = self._schemas[channel.schema]
+            schema = self._writer.register_schema(known.name, known.encoding, known.data)
+            self._new_schemas[channel.schema] = schema
+        return self._writer.register_channel(channel.topic, channel.encoding, schema)
