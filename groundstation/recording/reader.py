@@ -4,6 +4,7 @@ The index at the end of the file says which chunks hold which channels; chunks a
 time, so that a recording of any length is read in little memory.
 """
 
+import struct
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,9 @@ from groundstation.recording.records import (
     complete_records,
     read_chunk,
 )
+
+# what the library lets through when it meets the torn or garbled end of a file
+_UNREADABLE = (McapError, EOFError, ValueError, KeyError, OverflowError, OSError, struct.error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +85,7 @@ class Recording:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
+            self._size = path.stat().st_size
             self._file = path.open("rb")
         except OSError as error:
             raise RecordingError(f"{path} cannot be opened: {error.strerror}") from error
@@ -180,12 +185,12 @@ class Recording:
     def _open(self) -> tuple[Summary, RecordingInfo]:
         try:
             reader = SeekingReader(self._file)
-        except (McapError, EOFError, ValueError) as error:
+        except _UNREADABLE as error:
             raise RecordingError(f"{self.path} is no MCAP file") from error
         try:
             summary = reader.get_summary()
             metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-        except (McapError, EOFError, ValueError, OSError) as error:
+        except _UNREADABLE as error:
             raise RecordingError(
                 f"{self.path} was not finished or is damaged: try `groundstation recording recover`"
             ) from error
@@ -194,9 +199,11 @@ class Recording:
         return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {}))
 
     def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str]]) -> Iterator[Recorded]:
-        self._file.seek(index.chunk_start_offset + RECORD.size)
-        chunk = read_chunk(self._file.read(index.chunk_length - RECORD.size))
         try:
+            if index.chunk_start_offset + index.chunk_length > self._size:
+                raise DamagedChunkError("a chunk is said to lie behind the end of the file")
+            self._file.seek(index.chunk_start_offset + RECORD.size)
+            chunk = read_chunk(self._file.read(index.chunk_length - RECORD.size))
             if chunk is None or not chunk.complete:
                 raise DamagedChunkError("a chunk is cut off")
             data = chunk.unpack()

@@ -149,10 +149,10 @@ def _open_new(path: Path, part_path: Path) -> BinaryIO:
         raise RecordingError(f"{path} is already there: recordings are never overwritten")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if part_path.exists():
+            raise RecordingError(
+                f"{part_path} is left of a recording that was not finished: recover it or remove it first"
+            )
         return part_path.open("xb")
-    except FileExistsError:
-        raise RecordingError(
-            f"{part_path} is left of a recording that was not finished: recover it or remove it first"
-        ) from None
     except OSError as error:
         raise RecordingError(f"{part_path} cannot be written: {error.strerror}") from error

@@ -1,0 +1,59 @@
+"""A small flight to record: two vehicles, every kind of scope, an image now and then."""
+
+import numpy as np
+import pytest
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.topics import Scope, topic_of
+from groundstation.messages import definitions as m
+from groundstation.messages.cdr import ros_fields
+
+PERIOD_NS = 10_000_000
+
+
+def envelope_of(payload, sequence, process, publish_ns):
+    topic = topic_of(type(payload))
+    owner = process if topic.scope is Scope.PROCESS else payload.vehicle
+    return Envelope(topic, owner, sequence, publish_ns)
+
+
+def spots(stamp_ns, vehicle, some):
+    """Three spots; every array of the payload holds ``some``."""
+    empty = {"float32[]": some, "float64": 1.5, "int64": stamp_ns, "string": ""}
+    return m.StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(m.StarSpots)))
+
+
+def fly(steps: int, seed: int = 7) -> list[Delivered]:
+    """Messages in the order of their publication, 10 ms apart."""
+    random = np.random.default_rng(seed)
+    counts: dict = {}
+    flight = []
+
+    def say(payload, publish_ns):
+        key = (type(payload), payload.vehicle)
+        counts[key] = counts.get(key, 0) + 1
+        flight.append(Delivered(envelope_of(payload, counts[key], "flight", publish_ns), payload))
+
+    for step in range(steps):
+        now_ns = (step + 1) * PERIOD_NS
+        for vehicle in ("alpha", "bravo"):
+            say(m.ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
+            force = tuple(random.normal(size=2).tolist())
+            say(m.Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
+        say(m.CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
+        if step % 7 == 0:
+            say(m.StarImage(now_ns, "alpha", 8, 8, "mono8", 0, 8, random.bytes(64)), now_ns)
+            say(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
+        if step % 10 == 9:
+            say(m.Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
+    return flight
+
+
+@pytest.fixture(scope="session")
+def small_flight():
+    return fly
+
+
+@pytest.fixture(scope="session")
+def flight():
+    return fly(120)

@@ -1,0 +1,206 @@
+"""A killed recorder leaves a file from which every readable message comes back, wherever it is cut."""
+
+import contextlib
+import io
+import struct
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.policy import ImagePolicy
+from groundstation.recording.reader import Recording
+from groundstation.recording.recover import recover
+from groundstation.recording.writer import Recorder
+
+INFO = RecordingInfo("name = 'two mock-ups'\n", images=ImagePolicy.LOSSLESS, seed=5)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, small_flight):
+    """Bytes of a finished recording of several chunks."""
+    path = tmp_path_factory.mktemp("whole") / "a.mcap"
+    with Recorder(path, INFO) as recorder:
+        for delivered in small_flight(60):
+            recorder.record(delivered, delivered.envelope.publish_ns)
+    return path.read_bytes()
+
+
+def messages(path):
+    with Recording(path) as recording:
+        assert recording.info == INFO
+        return [(r.envelope, r.data, r.log_ns) for r in recording.messages()]
+
+
+def readable(data: bytes) -> int:
+    """Messages that the reference reader finds in the complete chunks of a torn file."""
+    count = 0
+    with contextlib.suppress(McapError, EOFError, ValueError, struct.error):
+        for record in StreamReader(io.BytesIO(data)).records:
+            count += isinstance(record, Message)
+    return count
+
+
+def recovered(folder, data: bytes):
+    source, target = folder / "torn.mcap.part", folder / "recovered.mcap"
+    source.write_bytes(data)
+    target.unlink(missing_ok=True)
+    return recover(source, target), target
+
+
+def chunk_ends(data: bytes) -> list[int]:
+    """Where complete chunks end: the places at which what is readable changes."""
+    reader = make_reader(io.BytesIO(data))
+    indexes = reader.get_summary().chunk_indexes
+    return [index.chunk_start_offset + index.chunk_length for index in indexes]
+
+
+def test_every_cut_gives_back_a_prefix_with_no_readable_message_lost(tmp_path, whole):
+    report, target = recovered(tmp_path, whole)
+    everything = messages(target)
+    assert report.was_finished
+    assert report.torn_bytes == 0
+    first = whole.index(b"groundstation", 40) + 1200  # behind the provenance
+    ends = chunk_ends(whole)
+    assert len(ends) > 2
+
+    @settings(max_examples=60, deadline=None, derandomize=True)
+    @given(st.integers(first, len(whole)) | st.sampled_from([e + d for e in ends for d in (-1, 0, 1)]))
+    def check(cut):
+        report, target = recovered(tmp_path, whole[:cut])
+        found = messages(target)
+        assert found == everything[: len(found)]
+        assert len(found) >= readable(whole[:cut])
+        assert report.messages == len(found)
+        assert report.damaged_chunks == report.orphans == 0
+
+    check()
+
+
+def test_a_cut_in_the_head_is_refused_or_gives_an_empty_recording(tmp_path, whole):
+    for cut in range(0, 600, 7):
+        (tmp_path / "x.part").write_bytes(whole[:cut])
+        target = tmp_path / f"{cut}.mcap"
+        if cut < 8:
+            with pytest.raises(RecordingError, match="no MCAP"):
+                recover(tmp_path / "x.part", target)
+            assert not target.exists()
+        else:
+            assert recover(tmp_path / "x.part", target).messages == 0
+            with Recording(target) as recording:
+                assert list(recording.messages()) == []
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
+def test_the_torn_chunk_itself_gives_what_its_compressor_had_finished(tmp_path, compression, small_flight):
+    # one chunk of more than a compressor's block: the reference reader would lose all of it
+    file = io.BytesIO()
+    writer = Writer(file, chunk_size=1 << 30, compression=compression)
+    writer.start(profile="ros2")
+    channel = writer.register_channel("/alpha/imu_bytes", "cdr", 0)
+    payload = small_flight(1)[0]
+    data = payload.envelope.topic.codec.encode(payload.payload)
+    for number in range(8000):
+        writer.add_message(channel, number, data + number.to_bytes(3, "little"), number, number)
+    writer.finish()
+    cut = file.getvalue()[: chunk_ends(file.getvalue())[0] - 10]
+    assert readable(cut) == 0
+    report, target = recovered(tmp_path, cut)
+    assert 4000 < report.messages < 8000
+    with Recording(target) as recording:
+        assert [r.envelope.sequence for r in recording.messages()] == list(range(report.messages))
+
+
+def test_a_file_without_chunks_is_recovered_too(tmp_path, small_flight):
+    file = io.BytesIO()
+    writer = Writer(file, use_chunking=False)
+    writer.start()
+    channel = writer.register_channel("/alpha/imu_bytes", "cdr", 0)
+    for number in range(5):
+        writer.add_message(channel, number, bytes(50), number, number)
+    report, _ = recovered(tmp_path, file.getvalue()[:-20])
+    assert report.messages == 4
+    assert report.torn_bytes == 9 + 22 + 50 - 20
+
+
+def test_a_damaged_chunk_costs_itself_and_its_neighbours_live(tmp_path, whole):
+    second = chunk_ends(whole)[1]
+    broken = bytearray(whole)
+    broken[second - 40] ^= 0x10
+    report, target = recovered(tmp_path, bytes(broken))
+    assert report.damaged_chunks == 1
+    assert report.orphans == 0
+    lost = {m for m in complete(whole) if m not in set(messages(target))}
+    inside = chunk_spans(whole)[1]
+    assert {inside[0] <= log_ns <= inside[1] for _, _, log_ns in lost} == {True}
+
+
+def complete(data: bytes):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "w.mcap"
+        path.write_bytes(data)
+        return messages(path)
+
+
+def chunk_spans(data: bytes) -> list[tuple[int, int]]:
+    chunks = [r for r in StreamReader(io.BytesIO(data), emit_chunks=True).records if isinstance(r, Chunk)]
+    return [(chunk.message_start_time, chunk.message_end_time) for chunk in chunks]
+
+
+def test_channels_named_in_a_damaged_chunk_are_found_in_the_index(tmp_path, whole):
+    broken = bytearray(whole)
+    broken[chunk_ends(whole)[0] - 40] ^= 0x10
+    report, target = recovered(tmp_path, bytes(broken))
+    assert report.damaged_chunks == 1
+    assert report.orphans == 0  # the index at the end repeats the channels
+    assert messages(target)
+    report, _ = recovered(tmp_path, bytes(broken[: chunk_ends(whole)[2]]))
+    assert report.orphans > 0  # without the index they are lost, and counted
+
+
+def test_zeros_that_a_power_cut_left_are_no_records(tmp_path, whole):
+    cut = chunk_ends(whole)[1]
+    report, target = recovered(tmp_path, whole[:cut] + bytes(4096))
+    assert report.messages == readable(whole[:cut]) == len(messages(target))
+    assert report.torn_bytes == 4096
+
+
+def test_the_source_stays_and_nothing_is_overwritten(tmp_path, whole):
+    report, target = recovered(tmp_path, whole[:-100])
+    assert report.messages > 0
+    assert (tmp_path / "torn.mcap.part").read_bytes() == whole[:-100]
+    with pytest.raises(RecordingError, match="already there"):
+        recover(tmp_path / "torn.mcap.part", target)
+    with pytest.raises(RecordingError, match="No such file"):
+        recover(tmp_path / "nothing.part", tmp_path / "n.mcap")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["recovered.mcap", "torn.mcap.part"]
+
+
+def test_a_torn_or_garbled_file_is_read_or_refused_in_one_sentence(tmp_path, whole):
+    path = tmp_path / "garbled.mcap"
+
+    @settings(max_examples=150, deadline=None, derandomize=True)
+    @given(
+        st.integers(0, len(whole)),
+        st.lists(st.tuples(st.integers(1, 1500), st.integers(0, 255)), max_size=4),
+    )
+    def check(cut, noise):
+        data = bytearray(whole)
+        for place, value in noise:
+            data[-place] = value  # the index is at the end
+        if not noise:
+            del data[cut:]
+        path.write_bytes(data)
+        with contextlib.suppress(RecordingError), Recording(path) as recording:
+            list(recording.messages())
+
+    check()

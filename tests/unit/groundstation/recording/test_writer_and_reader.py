@@ -1,0 +1,219 @@
+"""What is recorded comes back, in order and bit for bit; equal runs give equal files."""
+
+import itertools
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from groundstation.bus.topics import TOPICS, topic_named, topic_of
+from groundstation.messages import definitions as m
+from groundstation.recording.channels import channel_name, parse_channel
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.policy import ImagePolicy
+from groundstation.recording.reader import Recording
+from groundstation.recording.writer import Recorder
+
+EVERYTHING = RecordingInfo(images=ImagePolicy.LOSSLESS)
+
+
+def record(path, flight, info=EVERYTHING):
+    with Recorder(path, info) as recorder:
+        for delivered in flight:
+            recorder.record(delivered, delivered.envelope.publish_ns)
+    return path
+
+
+def encoded(flight):
+    return [(d.envelope, d.envelope.topic.codec.encode(d.payload)) for d in flight]
+
+
+def test_what_was_recorded_comes_back_in_order_and_bit_for_bit(tmp_path, flight):
+    with Recording(record(tmp_path / "a.mcap", flight)) as recording:
+        found = list(recording.messages())
+    assert [(r.envelope, r.data) for r in found] == encoded(flight)
+    assert [r.log_ns for r in found] == [d.envelope.publish_ns for d in flight]
+
+
+def test_payloads_come_back_decoded(tmp_path, flight):
+    with Recording(record(tmp_path / "a.mcap", flight)) as recording:
+        found = list(recording.delivered())
+    assert encoded(found) == encoded(flight)
+
+
+def test_bytes_from_the_bus_and_payloads_make_the_same_file(tmp_path, flight):
+    first = record(tmp_path / "a.mcap", flight)
+    with Recorder(tmp_path / "b.mcap", RecordingInfo(images=ImagePolicy.LOSSLESS)) as recorder:
+        for envelope, data in encoded(flight):
+            recorder.record_encoded(envelope, data, envelope.publish_ns)
+    assert first.read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def test_two_equal_runs_give_equal_bytes(tmp_path, flight):
+    info = RecordingInfo("[table]\n", "rigs/two.toml", ImagePolicy.SPOTS, {"b": "2", "a": "1"}, 7, "x 1")
+    assert (
+        record(tmp_path / "a.mcap", flight, info).read_bytes()
+        == record(tmp_path / "b.mcap", flight, info).read_bytes()
+    )
+
+
+def test_topics_and_owners_can_be_chosen(tmp_path, flight):
+    with Recording(record(tmp_path / "a.mcap", flight)) as recording:
+        wrench = topic_of(m.Wrench)
+        found = list(recording.messages([wrench], ["bravo"]))
+        assert [(r.envelope, r.data) for r in found] == [
+            item for item in encoded(flight) if item[0].topic is wrench and item[0].vehicle == "bravo"
+        ]
+        assert list(recording.messages([], None)) == []
+
+
+def test_a_stretch_of_time_can_be_chosen(tmp_path, flight):
+    with Recording(record(tmp_path / "a.mcap", flight)) as recording:
+        found = [r.log_ns for r in recording.messages(start_ns=300_000_000, stop_ns=700_000_000)]
+    assert found == [
+        d.envelope.publish_ns for d in flight if 300_000_000 <= d.envelope.publish_ns < 700_000_000
+    ]
+
+
+def test_messages_logged_late_come_in_the_order_of_their_log_times(tmp_path, flight):
+    # the recorder of a live rig gets a message of another process after newer ones of its own
+    with Recorder(tmp_path / "a.mcap", RecordingInfo(images=ImagePolicy.LOSSLESS)) as recorder:
+        for place, delivered in enumerate(flight):
+            late_ns = 400_000_000 if place % 5 == 0 else 0
+            recorder.record(delivered, delivered.envelope.publish_ns + late_ns)
+    with Recording(tmp_path / "a.mcap") as recording:
+        found = [r.log_ns for r in recording.messages()]
+    assert len(found) == len(flight)
+    assert found == sorted(found)
+
+
+def test_the_rig_decides_what_is_kept_of_the_cameras(tmp_path, flight):
+    kept = {}
+    for policy in ImagePolicy:
+        path = record(tmp_path / f"{policy}.mcap", flight, RecordingInfo(images=policy))
+        with Recording(path) as recording:
+            kept[policy] = {channel.topic.noun for channel in recording.channels}
+            assert recording.info.images is policy
+    assert {"star_image", "star_spots"} <= kept[ImagePolicy.LOSSLESS]
+    assert kept[ImagePolicy.LOSSLESS] - kept[ImagePolicy.SPOTS] == {"star_image"}
+    assert kept[ImagePolicy.SPOTS] - kept[ImagePolicy.OFF] == {"star_spots"}
+
+
+def test_provenance_comes_back(tmp_path):
+    info = RecordingInfo(
+        "name = 'x'\n", "/lab/x.toml", ImagePolicy.OFF, {"alpha_imu": "ab" * 32}, 42, "groundstation 9", 17
+    )
+    with Recording(record(tmp_path / "a.mcap", [], info)) as recording:
+        assert recording.info == info
+        assert list(recording.messages()) == []
+
+
+def test_a_recording_in_virtual_time_names_no_date():
+    said = RecordingInfo(seed=3).to_metadata()
+    assert said["clock"] == "virtual"
+    assert "utc_offset_ns" not in said
+
+
+def test_an_open_recording_is_a_part_and_loses_at_most_a_quarter_of_a_second(tmp_path, flight):
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, RecordingInfo(images=ImagePolicy.LOSSLESS))
+    sizes = [recorder.part_path.stat().st_size]
+    for delivered in flight:
+        recorder.record(delivered, delivered.envelope.publish_ns)
+        sizes.append(recorder.part_path.stat().st_size)
+    grown = [d.envelope.publish_ns for d, a, b in zip(flight, sizes, sizes[1:], strict=False) if b > a]
+    assert sizes[0] > 0  # the provenance is on the disk at once
+    assert max(b - a for a, b in itertools.pairwise(grown)) <= 260_000_000
+    assert not path.exists()
+    recorder.finish()
+    assert recorder.finish() == path
+    assert path.exists()
+    assert not recorder.part_path.exists()
+
+
+def test_silence_closes_the_chunk_too(tmp_path, flight):
+    recorder = Recorder(tmp_path / "run.mcap", RecordingInfo(), durable=True)
+    recorder.record(flight[0], 1_000)
+    before = recorder.part_path.stat().st_size
+    recorder.tick(200_000_000)
+    assert recorder.part_path.stat().st_size == before
+    recorder.tick(300_000_000)
+    assert recorder.part_path.stat().st_size > before
+    recorder.finish()
+
+
+def test_an_exception_in_the_run_still_finishes_the_recording(tmp_path, flight):
+    def run():
+        with Recorder(tmp_path / "a.mcap", RecordingInfo()) as recorder:
+            recorder.record(flight[0], 1)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert len(list(recording.messages())) == 1
+
+
+def test_nothing_already_recorded_is_overwritten(tmp_path, flight):
+    path = record(tmp_path / "a.mcap", flight)
+    with pytest.raises(RecordingError, match="already there"):
+        Recorder(path, RecordingInfo())
+    left = tmp_path / "b.mcap.part"
+    left.write_bytes(b"what a killed recorder left")
+    with pytest.raises(RecordingError, match="not finished"):
+        Recorder(tmp_path / "b.mcap", RecordingInfo())
+    assert left.read_bytes() == b"what a killed recorder left"
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        Recorder(tmp_path / "file" / "a.mcap", RecordingInfo())
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [(b"", "no MCAP"), (b"PK\3\4 something else entirely", "no MCAP"), (b"\x89MCAP0\r\n", "not finished")],
+)
+def test_a_file_that_is_no_recording_is_refused_in_one_sentence(tmp_path, content, sentence):
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=sentence):
+        Recording(path)
+
+
+def test_a_file_that_is_not_there_is_refused_in_one_sentence(tmp_path):
+    with pytest.raises(RecordingError, match="No such file"):
+        Recording(tmp_path / "nothing.mcap")
+
+
+def test_a_damaged_chunk_is_named_and_not_passed_over(tmp_path, flight):
+    path = record(tmp_path / "a.mcap", flight)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 0x40
+    path.write_bytes(data)
+    with Recording(path) as recording, pytest.raises(RecordingError, match="recover"):
+        list(recording.messages())
+
+
+def test_a_viewer_reads_the_file(tmp_path, flight):
+    path = record(tmp_path / "a.mcap", flight)
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        found = list(reader.iter_decoded_messages(topics=["/alpha/wrench"]))
+    wanted = [d.payload for d in flight if isinstance(d.payload, m.Wrench) and d.payload.vehicle == "alpha"]
+    assert [f.decoded_message.wrench.force.x for f in found] == [w.force_x_n for w in wanted]
+    assert {f.schema.name for f in found} == {"geometry_msgs/msg/WrenchStamped"}
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.noun)
+def test_channel_names_are_read_back(topic):
+    owner = "" if topic.scope.name == "RIG" else "alpha"
+    assert parse_channel(channel_name(topic, owner)) == (topic, owner)
+
+
+def test_channels_of_others_are_left_alone():
+    assert parse_channel("/tf") is None
+    assert parse_channel("/alpha/state") == (topic_named("state"), "alpha")
