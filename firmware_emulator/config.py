@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.imu_block.protocol import V1_WIRE_BYTES, V2_WIRE_BYTES
+from drivers.valve_bus.protocol import MAX_VEHICLES, VALVES
 from firmware_emulator.faults import FaultConfig
 
 Pair = tuple[float, float]
@@ -111,7 +113,7 @@ class ImuConfig(Settings):
     frame_version: Literal[1, 2] = 2
     baud: Literal[115200, 250000] = 250000
     """Nominal; the PIC's divider makes 113636 of 115200."""
-    averaging: Annotated[int, Field(ge=1, le=255)] = 10
+    averaging: Annotated[int, Field(ge=1, le=100)] = 10
     """Polls per frame: 1000 / averaging frames per second."""
     ftdi_latency_ms: Annotated[int, Field(ge=1, le=255)] = 16
     host_jitter_s: NonNegative = 0.0001
@@ -143,7 +145,7 @@ class ImuConfig(Settings):
 
     @model_validator(mode="after")
     def _line_carries_the_frames(self) -> "ImuConfig":
-        frame_bytes = 22 if self.frame_version == 2 else 9
+        frame_bytes = V2_WIRE_BYTES if self.frame_version == 2 else V1_WIRE_BYTES
         if 1000.0 / self.averaging * frame_bytes * 10.0 > 0.99 * self.baud:
             raise ValueError(
                 f"averaging = {self.averaging} makes {1000 / self.averaging:.0f} frames/s, "
@@ -166,6 +168,8 @@ class CameraConfig(Settings):
     delay_jitter_s: NonNegative = 0.002
     sigma_xy_m: NonNegative = 0.001
     sigma_heading_rad: NonNegative = 0.00087
+    missing_fraction: Fraction = 0.0
+    """Of the exposures, how many give no drawn fix."""
     wrong_fraction: Fraction = 0.0
     """Of the drawn fixes, how many are wrong by more than their sigma says, unmarked."""
     stream: Literal["raw", "mjpeg"] = "raw"
@@ -217,13 +221,9 @@ class VehicleConfig(Settings):
 
     @model_validator(mode="after")
     def _valves_fit_the_bus(self) -> "VehicleConfig":
-        if len(self.thrusters) != VALVES_PER_NODE:
-            raise ValueError(f"thrusters must be {VALVES_PER_NODE}, got {len(self.thrusters)}")
+        if len(self.thrusters) != VALVES:
+            raise ValueError(f"thrusters must be {VALVES}, got {len(self.thrusters)}")
         return self
-
-
-VALVES_PER_NODE = 8  # a command frame has eight on-times (docs/interfaces/valve_bus.md)
-MAX_VEHICLES = 15  # identifiers of the valve bus
 
 
 class LaboratoryConfig(Settings):

@@ -50,6 +50,14 @@ class Felt:
     force_x_m_s2: float | Floats
     force_y_m_s2: float | Floats
 
+    def without_first(self, polls: int) -> "Felt":
+        """The same without its first polls."""
+        rate, x, y = (
+            value if isinstance(value, float) else value[polls:]
+            for value in (self.rate_rad_s, self.force_x_m_s2, self.force_y_m_s2)
+        )
+        return Felt(self.polls - polls, rate, x, y)
+
 
 class PollGrid:
     """Moments at which a microcontroller polls its sensors: its crystal's kHz, not the host's.

@@ -1,0 +1,154 @@
+"""The webcam that looks up: when it exposes, where the vehicle is meanwhile, when the picture arrives.
+
+What the picture shows is the business of `firmware_emulator.sky`, behind `Renderer`; so pictures may be
+drawn at once (lockstep) or by another process (live).
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_emulator.devices.pending import take_until
+from firmware_emulator.faults import Faults
+from firmware_emulator.plant.motion_state import Motion
+from firmware_emulator.plant.rigid_body import Vehicle
+from firmware_emulator.plant.thrusters import NS_PER_S
+
+Pose = tuple[float, float, float]
+"""x, y (m) and heading (rad) of the body origin in the table frame."""
+_JITTER_LIMIT = 6.0  # standard deviations
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """One picture to be drawn.
+
+    Attributes:
+        sequence: Counts the exposures from 0.
+        start: Pose when the shutter opened (of the first row, with a rolling shutter).
+        end: Pose when it closed (of the last row).
+        middle_ns: Middle of the exposure.
+        arrival_ns: When the picture reaches the host.
+        is_sky_dead: The lights are off.
+        false_lights: Lights to add that no catalogue knows.
+    """
+
+    sequence: int
+    start: Pose
+    end: Pose
+    middle_ns: int
+    arrival_ns: int
+    is_sky_dead: bool
+    false_lights: int
+
+
+class Renderer(Protocol):
+    """Draws what the camera sees."""
+
+    def render(self, exposure: Exposure) -> NDArray[np.uint8]:
+        """The picture, shape (height, width)."""
+        ...
+
+
+class StarCamera:
+    """Timing and place of one camera's exposures.
+
+    Args:
+        vehicle: That carries it.
+        rate_hz: Pictures per second.
+        exposure_s: How long a row is exposed.
+        readout_s: From the first row's exposure to the last one's.
+        delay_s: From the middle of the exposure until the picture is at the host.
+        delay_jitter_s: Its standard deviation.
+        faults: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`.
+        rng: For the jitter.
+        start_ns: First exposure begins one period later.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        exposure_s: float,
+        readout_s: float,
+        delay_s: float,
+        delay_jitter_s: float,
+        faults: Faults,
+        rng: np.random.Generator,
+        start_ns: int,
+    ) -> None:
+        self._vehicle = vehicle
+        self._period_ns = round(NS_PER_S / rate_hz)
+        self._open_ns = round((exposure_s + readout_s) * NS_PER_S)
+        self._delay_ns = round(delay_s * NS_PER_S)
+        self._jitter_ns = delay_jitter_s * NS_PER_S
+        self._faults, self._rng, self._start_ns = faults, rng, start_ns
+        self._opens_ns = start_ns + self._period_ns
+        self._start: Motion | None = None
+        self._frozen: tuple[Pose, Pose] | None = None
+        self._sequence = 0
+        self._last_arrival_ns = 0
+        self._pending: deque[tuple[int, Exposure]] = deque()
+
+    @property
+    def next_ns(self) -> int:
+        """When the shutter next moves."""
+        return self._opens_ns if self._start is None else self._opens_ns + self._open_ns
+
+    @property
+    def next_output_ns(self) -> int:
+        """When the next picture may reach the host."""
+        if self._pending:
+            return self._pending[0][0]
+        middle_ns = self._opens_ns + self._open_ns // 2
+        early_ns = middle_ns + self._delay_ns - round(_JITTER_LIMIT * self._jitter_ns)
+        return max(self._opens_ns + self._open_ns, early_ns)
+
+    def run(self, now_ns: int) -> None:
+        """Open or close the shutter."""
+        if self._start is None:
+            self._start = self._vehicle.origin_at(now_ns)
+            return
+        start, end = _pose(self._start), _pose(self._vehicle.origin_at(now_ns))
+        self._start = None
+        middle_ns = self._opens_ns + self._open_ns // 2
+        self._opens_ns += self._period_ns
+        age_ns = middle_ns - self._start_ns
+        jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
+        arrival_ns = max(now_ns, middle_ns + self._delay_ns + round(jitter * self._jitter_ns))
+        self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
+        if not self._faults.active("frozen_camera", age_ns):
+            self._frozen = None
+        elif self._frozen is None:
+            self._frozen = (start, end)
+        start, end = self._frozen or (start, end)
+        false_lights = self._faults.active("false_lights", age_ns)
+        exposure = Exposure(
+            self._sequence,
+            start,
+            end,
+            middle_ns,
+            self._last_arrival_ns,
+            self._faults.active("dead_sky", age_ns) is not None,
+            int(false_lights.parameters["count"]) if false_lights else 0,
+        )
+        self._sequence += 1
+        if not self._faults.active("silent_camera", age_ns):
+            self._pending.append((exposure.arrival_ns, exposure))
+
+    def take(self, until_ns: int) -> list[tuple[int, Exposure]]:
+        """Exposures whose pictures reached the host up to `until_ns`."""
+        return take_until(self._pending, until_ns)
+
+    def take_exposed(self) -> list[Exposure]:
+        """Exposures taken so far, ahead of their arrival: for one who draws them elsewhere."""
+        taken = [exposure for _, exposure in self._pending]
+        self._pending.clear()
+        return taken
+
+
+def _pose(motion: Motion) -> Pose:
+    return motion.x_m, motion.y_m, motion.heading_rad

@@ -1,0 +1,238 @@
+"""The CAN node of one vehicle: commands to coil currents, and what it says about itself.
+
+A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man, silence
+of 100 ms closes all, a stop closes all and disarms (`docs/interfaces/valve_bus.md`).
+"""
+
+from collections import deque
+
+import numpy as np
+
+from drivers.valve_bus.protocol import (
+    ARM_KEY,
+    EVERY_VEHICLE,
+    SILENCE_CLOSES_S,
+    Arm,
+    CanFrame,
+    FloatAir,
+    Heartbeat,
+    NodeState,
+    Stop,
+    TankPressure,
+    ValveCommand,
+    ValveStatus,
+    decode,
+    encode,
+)
+from firmware_emulator.faults import Faults
+from firmware_emulator.plant.rigid_body import Vehicle
+from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S
+
+STATUS_NS = 20_000_000
+SLOW_NS = 200_000_000  # pressure and heartbeat
+FIRMWARE = (1, 0)
+_SILENCE_NS = round(SILENCE_CLOSES_S * NS_PER_S)
+_MS = 1_000_000
+_TANK_NOISE_PA = 20e3
+_SUPPLY_NOISE_PA = 500.0
+_GAS_K = 293.0
+_STUCK_KINDS = ("stuck_open_valve", "stuck_closed_valve", "leaking_valve")
+
+
+class ValveNode:
+    """Firmware of the node.
+
+    Args:
+        index: Vehicle's index on the bus.
+        vehicle: What its valves push.
+        minimum_on_ms: A closed valve is not opened for a shorter pulse.
+        float_delay_s: From switching the air until the bearings lift or set down.
+        faults: Valve and bus faults.
+        rng: For sensor noise.
+        start_ns: Power-up.
+    """
+
+    def __init__(
+        self,
+        index: int,
+        vehicle: Vehicle,
+        minimum_on_ms: int,
+        float_delay_s: float,
+        faults: Faults,
+        rng: np.random.Generator,
+        start_ns: int = 0,
+    ) -> None:
+        self._index, self._vehicle = index, vehicle
+        self._minimum_on_ms, self._float_delay_s = minimum_on_ms, float_delay_s
+        self._faults, self._rng, self._start_ns = faults, rng, start_ns
+        self._inbox: deque[tuple[int, CanFrame]] = deque()
+        self.outbox: list[CanFrame] = []  # what it wants to say now
+        self._off_ns: dict[int, int] = {}  # energised valves and when their time is up
+        self._dead_man_ns = FAR_FUTURE_NS
+        # Nodes do not power up at the same moment: their cycles are spread over the bus.
+        self._status_ns = start_ns + STATUS_NS + index * 1_300_000
+        self._slow_ns = start_ns + SLOW_NS + index * 1_300_000 + 600_000
+        self._fault_edges_ns = deque(start_ns + edge_ns for edge_ns in faults.edges_ns("valves"))
+        self._is_armed = self._is_stopped = self._is_dead_man_closed = False
+        self._is_air_on = vehicle.is_floating
+        self._last_counter: int | None = None
+        self._last_pulse_id: int | None = None
+        self._rejected = self._short_pulses = self._status_counter = 0
+
+    @property
+    def next_ns(self) -> int:
+        """Moment of the next thing it does."""
+        next_ns = min(self.next_output_ns, self._dead_man_ns)
+        if self._off_ns:
+            next_ns = min(next_ns, *self._off_ns.values())
+        if self._inbox:
+            next_ns = min(next_ns, self._inbox[0][0])
+        return min(next_ns, self._fault_edges_ns[0]) if self._fault_edges_ns else next_ns
+
+    @property
+    def next_output_ns(self) -> int:
+        """When it next says something."""
+        return min(self._status_ns, self._slow_ns)
+
+    @property
+    def short_pulses(self) -> int:
+        """Pulses not executed because they were shorter than the minimum on-time."""
+        return self._short_pulses
+
+    def receive(self, stamp_ns: int, frame: CanFrame) -> None:
+        """A frame that is complete on the bus at `stamp_ns`."""
+        self._inbox.append((stamp_ns, frame))
+
+    def run(self, now_ns: int) -> None:
+        """Do what is due at `now_ns`: time-outs first, then what was heard, then speak."""
+        while self._fault_edges_ns and self._fault_edges_ns[0] <= now_ns:
+            self._fault_edges_ns.popleft()
+            self._set_valve_faults(now_ns)
+        for valve in [valve for valve, off_ns in self._off_ns.items() if off_ns <= now_ns]:
+            self._close([valve], now_ns)
+        if self._dead_man_ns <= now_ns:
+            self._dead_man_ns = FAR_FUTURE_NS
+            self._is_dead_man_closed = True
+            self._close(list(self._off_ns), now_ns)
+        is_silent = self._faults.active("silent_bus", now_ns - self._start_ns) is not None
+        while self._inbox and self._inbox[0][0] <= now_ns:
+            _, frame = self._inbox.popleft()
+            if not is_silent:
+                self._hear(frame, now_ns)
+        self._speak(now_ns, is_silent)
+
+    def _hear(self, frame: CanFrame, now_ns: int) -> None:
+        message = decode(frame)
+        match message:
+            case ValveCommand(vehicle=self._index):
+                self._command(message, now_ns)
+            case Stop(vehicle=vehicle) if vehicle in (self._index, EVERY_VEHICLE):
+                self._close(list(self._off_ns), now_ns)
+                self._is_armed, self._is_stopped = False, True
+                self._dead_man_ns = FAR_FUTURE_NS
+            case Arm(vehicle=self._index, key=key) if key == ARM_KEY:
+                self._arm(message.is_armed, now_ns)
+            case FloatAir(vehicle=self._index):
+                self._vehicle.advance(now_ns)
+                self._vehicle.set_air(now_ns, message.is_on, self._float_delay_s)
+                self._is_air_on = message.is_on
+
+    def _arm(self, is_armed: bool, now_ns: int) -> None:
+        if is_armed and not self._is_armed:
+            self._last_pulse_id = self._last_counter = None
+        if not is_armed:
+            self._close(list(self._off_ns), now_ns)
+            self._dead_man_ns = FAR_FUTURE_NS
+        self._is_armed, self._is_stopped, self._is_dead_man_closed = is_armed, False, False
+
+    def _command(self, command: ValveCommand, now_ns: int) -> None:
+        if not self._is_armed or command.counter == self._last_counter:
+            self._rejected += 1
+            return
+        self._last_counter = command.counter
+        self._dead_man_ns = now_ns + _SILENCE_NS
+        self._is_dead_man_closed = False
+        if command.pulse_id == self._last_pulse_id:
+            return
+        self._last_pulse_id = command.pulse_id
+        for valve, on_ms in enumerate(command.on_times_ms):
+            if valve in self._off_ns:
+                self._off_ns[valve] = now_ns + on_ms * _MS
+                if on_ms == 0:
+                    self._close([valve], now_ns)
+            elif on_ms >= max(1, self._minimum_on_ms):
+                self._vehicle.advance(now_ns)
+                self._vehicle.thrusters.energise(now_ns, valve)
+                self._off_ns[valve] = now_ns + on_ms * _MS
+            elif on_ms:
+                self._short_pulses += 1
+
+    def _close(self, valves: list[int], now_ns: int) -> None:
+        if valves:
+            self._vehicle.advance(now_ns)
+        for valve in valves:
+            del self._off_ns[valve]
+            self._vehicle.thrusters.release(now_ns, valve)
+
+    def _set_valve_faults(self, now_ns: int) -> None:
+        age_ns = now_ns - self._start_ns
+        found = {kind: self._faults.all_active(kind, age_ns) for kind in _STUCK_KINDS}
+        self._vehicle.advance(now_ns)
+        self._vehicle.thrusters.set_faults(
+            {int(fault.parameters["valve"]) for fault in found["stuck_open_valve"]},
+            {int(fault.parameters["valve"]) for fault in found["stuck_closed_valve"]},
+            {
+                int(fault.parameters["valve"]): fault.parameters["fraction"]
+                for fault in found["leaking_valve"]
+            },
+        )
+
+    def _speak(self, now_ns: int, is_silent: bool) -> None:
+        if self._status_ns <= now_ns:
+            self._status_ns += STATUS_NS
+            self._status_counter = (self._status_counter + 1) & 0xF
+            if not is_silent:
+                self.outbox.append(self._status())
+        if self._slow_ns <= now_ns:
+            self._slow_ns += SLOW_NS
+            if not is_silent:
+                self.outbox += [encode(message) for message in self._slow_messages(now_ns)]
+
+    def _status(self) -> CanFrame:
+        mask = 0
+        for valve in self._off_ns:
+            mask |= 1 << valve
+        return encode(
+            ValveStatus(
+                vehicle=self._index,
+                open_mask=mask,
+                executed_counter=self._last_counter or 0,
+                executed_pulse_id=self._last_pulse_id or 0,
+                counter=self._status_counter,
+                is_armed=self._is_armed,
+                is_dead_man_closed=self._is_dead_man_closed,
+                is_stopped=self._is_stopped,
+                is_float_air_on=self._is_air_on,
+                rejected_commands=self._rejected & 0xFF,
+            )
+        )
+
+    def _slow_messages(self, now_ns: int) -> tuple[TankPressure, Heartbeat]:
+        self._vehicle.advance(now_ns)
+        tank_noise, supply_noise = self._rng.standard_normal(2)
+        bank = self._vehicle.thrusters
+        state = NodeState.STOPPED if self._is_stopped else NodeState.DISARMED
+        return (
+            TankPressure(
+                self._index,
+                tank_pa=max(0.0, bank.tank_pa + _TANK_NOISE_PA * float(tank_noise)),
+                supply_pa=max(0.0, bank.supply_pa + _SUPPLY_NOISE_PA * float(supply_noise)),
+                gas_temperature_k=_GAS_K,
+            ),
+            Heartbeat(
+                self._index,
+                uptime_ms=(now_ns - self._start_ns) // _MS & 0xFFFFFFFF,
+                state=NodeState.ARMED if self._is_armed else state,
+                firmware_version=FIRMWARE,
+            ),
+        )
