@@ -1,0 +1,29 @@
+"""When a picture was taken, from when it arrived."""
+
+import math
+from dataclasses import dataclass
+
+_NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ExposureDelay:
+    """Span from the middle of the exposure to the arrival of the picture's last byte on the host.
+
+    Attributes:
+        delay_s: Exposure's half, read-out, transfer and decoding in the camera; from the rig or calibration.
+        delay_std_s: Its uncertainty for one picture, jitter included.
+    """
+
+    delay_s: float
+    delay_std_s: float
+
+    def __post_init__(self) -> None:
+        for name in ("delay_s", "delay_std_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is a span of at least 0 s, got {value}")
+
+    def middle_ns(self, stamp_arrival_ns: int) -> int:
+        """Stamp of the middle of the exposure; uncertain by `delay_std_s`."""
+        return stamp_arrival_ns - round(self.delay_s * _NS_PER_S)

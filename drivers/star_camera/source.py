@@ -1,0 +1,233 @@
+"""Where pictures come from: a video device, a stream, a folder; one row per kind of address.
+
+A source blocks until its next picture is there. Nobody but `port.StarCamera` should read one, since a
+slow reader would see pictures that are seconds old.
+"""
+
+import http.client
+import socket
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+from urllib.parse import urlsplit
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import LinkLost, NotFound
+from drivers.star_camera.multipart import PartParser, boundary_of
+from drivers.star_camera.picture import decode_picture, to_mono
+
+_READ_BYTES = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A picture, when its last byte was read, and its number where the sender counts."""
+
+    image: NDArray[np.uint8]
+    stamp_arrival_ns: int
+    sequence: int | None = None
+
+
+class PictureSource(Protocol):
+    """Pictures one after the other."""
+
+    name: str
+    garbled: int
+    """Pictures that arrived broken."""
+
+    def read(self) -> Picture:
+        """Block until the next whole picture is there.
+
+        Raises:
+            LinkLost: The source ended, went away or fell silent.
+        """
+        ...
+
+    def close(self) -> None:
+        """Release the source; a `read` in another thread ends with LinkLost."""
+        ...
+
+
+class HttpSource:
+    """A multipart stream over HTTP: raw mono8, JPEG or PNG parts. No proxy, no redirection.
+
+    Raises:
+        NotFound: Nobody serves a multipart stream there.
+    """
+
+    def __init__(self, url: str, timeout_s: float) -> None:
+        self.name = url
+        self.garbled = 0
+        self._timeout_s = timeout_s
+        self._ready: deque[Picture] = deque()
+        self._reading = threading.Lock()
+        address = urlsplit(url)
+        path = (address.path or "/") + (f"?{address.query}" if address.query else "")
+        try:
+            self._connection = http.client.HTTPConnection(
+                address.hostname or "", address.port, timeout=timeout_s
+            )
+            self._connection.connect()
+            self._socket = self._connection.sock
+            self._connection.request("GET", path, headers={"Accept": "multipart/x-mixed-replace"})
+            self._response = self._connection.getresponse()
+        except (OSError, ValueError, http.client.HTTPException) as error:
+            if hasattr(self, "_connection"):
+                self._connection.close()
+            raise NotFound(f"star camera {url} does not answer: {error or type(error).__name__}") from error
+        content_type = self._response.headers.get("Content-Type", "")
+        boundary = boundary_of(content_type)
+        if self._response.status != http.client.OK or boundary is None:
+            self.close()
+            raise NotFound(
+                f"star camera {url} serves no picture stream:"
+                f" status {self._response.status}, content type {content_type!r}"
+            )
+        self._parts = PartParser(boundary)
+
+    def read(self) -> Picture:
+        """The next whole picture; pictures that cannot be decoded are counted and passed over."""
+        deadline_s = time.monotonic() + self._timeout_s
+        while not self._ready:
+            try:
+                with self._reading:
+                    chunk = self._response.read1(_READ_BYTES)
+            except (OSError, ValueError, http.client.HTTPException) as error:
+                raise LinkLost(f"star camera {self.name} is lost: {error or type(error).__name__}") from error
+            stamp_ns = time.monotonic_ns()
+            if not chunk:
+                raise LinkLost(f"star camera {self.name} ended its stream")
+            for part in self._parts.feed(chunk):
+                self._decode(part.headers, part.body, stamp_ns)
+            if not self._ready and time.monotonic() > deadline_s:
+                raise LinkLost(
+                    f"star camera {self.name} sends bytes but no picture for {self._timeout_s:g} s"
+                )
+        return self._ready.popleft()
+
+    def close(self) -> None:
+        """Shut the socket down, which wakes a reader."""
+        with suppress(OSError):  # the server may have been faster
+            self._socket.shutdown(socket.SHUT_RDWR)
+        with self._reading:
+            self._response.close()
+            self._connection.close()
+
+    def _decode(self, headers: dict[str, str], body: bytes, stamp_ns: int) -> None:
+        sequence = headers.get("x-sequence", "")
+        try:
+            image = decode_picture(headers, body)
+        except ValueError:
+            self.garbled += 1
+            return
+        self._ready.append(Picture(image, stamp_ns, int(sequence) if sequence.isdecimal() else None))
+
+
+class VideoSource:
+    """What OpenCV can capture: a device index, a device path, a stream such as rtsp.
+
+    Raises:
+        NotFound: It cannot be opened.
+    """
+
+    def __init__(self, address: int | str, timeout_s: float) -> None:
+        self.name = f"video {address}"
+        self.garbled = 0
+        self._reading = threading.Lock()
+        limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, round(timeout_s * 1e3)]
+        limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, round(timeout_s * 1e3)]
+        is_url = isinstance(address, str) and "://" in address
+        self._capture = (
+            cv2.VideoCapture(str(address), cv2.CAP_FFMPEG, limits) if is_url else cv2.VideoCapture(address)
+        )
+        if not self._capture.isOpened():
+            raise NotFound(f"star camera {self.name} cannot be opened")
+
+    def read(self) -> Picture:
+        """The next picture of the device."""
+        while True:
+            with self._reading:
+                is_there, image = self._capture.read()
+                stamp_ns = time.monotonic_ns()
+            if not is_there:
+                raise LinkLost(f"star camera {self.name} gives no more pictures")
+            try:
+                return Picture(to_mono(image), stamp_ns)
+            except ValueError:
+                self.garbled += 1
+
+    def close(self) -> None:
+        """Release the device, once a reader has its picture."""
+        with self._reading:
+            self._capture.release()
+
+
+class FolderSource:
+    """The PNG files of a folder in the order of their names, at a rate, then the end.
+
+    Raises:
+        NotFound: The folder is not there or holds no PNG file.
+    """
+
+    def __init__(self, folder: Path, rate_hz: float) -> None:
+        self.name = str(folder)
+        self.garbled = 0
+        self._closing = threading.Event()
+        self._files = sorted(folder.glob("*.png"))
+        if not self._files:
+            raise NotFound(f"star camera folder {folder} holds no PNG file")
+        self._period_s = 1.0 / rate_hz
+        self._next = 0
+        self._start_s: float | None = None
+
+    def read(self) -> Picture:
+        """The next file, not before its time."""
+        while self._next < len(self._files):
+            number, self._next = self._next, self._next + 1
+            now_s = time.monotonic()
+            self._start_s = now_s if self._start_s is None else self._start_s
+            if self._closing.wait(max(0.0, self._start_s + number * self._period_s - now_s)):
+                raise LinkLost(f"star camera folder {self.name} is closed")
+            try:
+                image = decode_picture({"content-type": "image/png"}, self._files[number].read_bytes())
+            except ValueError:
+                self.garbled += 1
+                continue
+            except OSError as error:
+                raise LinkLost(f"star camera folder {self.name} is lost: {error}") from error
+            return Picture(image, time.monotonic_ns(), number)
+        raise LinkLost(f"star camera folder {self.name} has no more pictures")
+
+    def close(self) -> None:
+        """End the wait of a reader."""
+        self._closing.set()
+
+
+def open_source(address: int | str, *, timeout_s: float, rate_hz: float) -> PictureSource:
+    """Open what an address of a rig file means.
+
+    Args:
+        address: A device index (`0` or `"0"`), a device path, an http URL (multipart stream), any other URL
+            that OpenCV takes, or a folder of PNG files.
+        timeout_s: How long opening and each picture may take.
+        rate_hz: Pictures per second of a folder.
+
+    Raises:
+        NotFound: It cannot be opened.
+    """
+    if isinstance(address, str) and address.isdecimal():
+        address = int(address)
+    if isinstance(address, int):
+        return VideoSource(address, timeout_s)
+    if address.startswith("http://"):
+        return HttpSource(address, timeout_s)
+    if Path(address).is_dir():
+        return FolderSource(Path(address), rate_hz)
+    return VideoSource(address, timeout_s)

@@ -1,0 +1,160 @@
+import itertools
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.star_camera.exposure import ExposureDelay
+from drivers.star_camera.frame import CameraFrame
+from drivers.star_camera.multipart import PartParser, boundary_of
+from drivers.star_camera.picture import decode_picture, to_mono
+
+BOUNDARY = b"--frame"
+BODIES = st.binary(max_size=60).filter(lambda body: BOUNDARY not in body)
+
+
+def part(body, has_length=True, headers=()):
+    lines = [b"--frame", b"Content-Type: application/x-mono8", *headers]
+    if has_length:
+        lines.append(b"Content-Length: %d" % len(body))
+    return b"\r\n".join(lines) + b"\r\n\r\n" + body + b"\r\n"
+
+
+def cut(stream, places):
+    edges = sorted({0, len(stream), *(place % (len(stream) + 1) for place in places)})
+    return [stream[a:b] for a, b in itertools.pairwise(edges)]
+
+
+@given(st.lists(st.tuples(BODIES, st.booleans()), max_size=5), st.lists(st.integers(0, 10_000), max_size=12))
+def test_parts_survive_any_chunking(bodies, places):
+    stream = b"".join(part(body, has_length) for body, has_length in bodies) + b"--frame"
+    parser = PartParser(BOUNDARY)
+    assert [p.body for chunk in cut(stream, places) for p in parser.feed(chunk)] == [
+        body for body, _ in bodies
+    ]
+    assert parser.bytes_skipped == 0
+
+
+@given(st.lists(st.binary(max_size=400), max_size=20))
+@settings(deadline=None)
+def test_garbage_never_raises_and_a_good_part_follows(chunks):
+    parser = PartParser(BOUNDARY)
+    for chunk in chunks:
+        list(parser.feed(chunk))
+    if BOUNDARY in b"".join(chunks):
+        return
+    assert [p.body for p in parser.feed(b"\r\n" + part(b"picture"))] == [b"picture"]
+
+
+def test_a_part_cut_short_costs_only_itself():
+    parser = PartParser(BOUNDARY)
+    whole = part(b"x" * 100)
+    bodies = [p.body for p in parser.feed(whole[:80] + part(b"good") + part(b"also good"))]
+    assert bodies[-2:] == [b"good", b"also good"]
+
+
+@pytest.mark.parametrize("length", [b"nonsense", b"-5", b"99999999999"])
+def test_a_senseless_length_costs_only_its_part(length):
+    parser = PartParser(BOUNDARY)
+    bad = b"--frame\r\nContent-Length: " + length + b"\r\n\r\nbody\r\n"
+    bodies = [p.body for chunk in (bad, part(b"good"), part(b"next")) for p in parser.feed(chunk)]
+    assert bodies == [b"good", b"next"]
+
+
+def test_headers_without_end_are_given_up():
+    parser = PartParser(BOUNDARY)
+    assert not list(parser.feed(BOUNDARY + b"x" * 20_000))
+    assert [p.body for p in parser.feed(part(b"good"))] == [b"good"]
+    assert parser.bytes_skipped >= 20_000
+
+
+def test_the_boundary_is_read_from_the_content_type():
+    assert boundary_of("multipart/x-mixed-replace; boundary=frame") == b"--frame"
+    assert boundary_of('multipart/x-mixed-replace;boundary="--frame"') == b"--frame"
+    assert boundary_of("text/html; charset=utf-8") is None
+    assert boundary_of("multipart/x-mixed-replace") is None
+
+
+STARS = np.zeros((48, 64), np.uint8)
+STARS[20, 30] = 255
+STARS[40, 3] = 128
+
+
+def jpeg(image):
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
+
+
+def png(image):
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def test_raw_and_png_pictures_are_exact():
+    raw = {"content-type": "application/x-mono8", "x-width": "64", "x-height": "48"}
+    assert np.array_equal(decode_picture(raw, STARS.tobytes()), STARS)
+    assert np.array_equal(decode_picture({"content-type": "image/png; q=1"}, png(STARS)), STARS)
+
+
+def test_a_jpeg_is_grey_and_close():
+    image = decode_picture({"content-type": "image/jpeg"}, jpeg(STARS) + b"\0\0")
+    assert image.shape == STARS.shape
+    assert np.unravel_index(image.argmax(), image.shape) == (20, 30)
+
+
+@pytest.mark.parametrize("keep", [0, 2, 100, -1])
+def test_a_truncated_jpeg_is_refused(keep):
+    with pytest.raises(ValueError, match="cut short"):
+        decode_picture({"content-type": "image/jpeg"}, jpeg(STARS)[:keep])
+
+
+def test_a_jpeg_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="no picture"):
+        decode_picture({"content-type": "image/jpeg"}, b"\xff\xd8" + bytes(50) + b"\xff\xd9")
+
+
+def test_a_truncated_png_is_refused():
+    with pytest.raises(ValueError, match="cut short"):
+        decode_picture({"content-type": "image/png"}, png(STARS)[:-20])
+
+
+@pytest.mark.parametrize(
+    ("headers", "size", "complaint"),
+    [
+        ({"x-width": "64", "x-height": "48"}, 64 * 48 - 1, "bytes"),
+        ({"x-width": "64"}, 64 * 48, "X-Height"),
+        ({"x-width": "0", "x-height": "48"}, 0, "X-Width"),
+        ({"x-width": "-64", "x-height": "-48"}, 64 * 48, "X-Width"),
+    ],
+)
+def test_a_raw_picture_of_another_size_is_refused(headers, size, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        decode_picture({"content-type": "application/x-mono8", **headers}, bytes(size))
+
+
+def test_an_unknown_kind_of_picture_is_refused():
+    with pytest.raises(ValueError, match="text/html"):
+        decode_picture({"content-type": "text/html"}, b"<html>")
+
+
+def test_a_colour_picture_becomes_grey():
+    assert np.array_equal(to_mono(np.dstack([STARS] * 3)), STARS)
+    assert to_mono(STARS) is STARS
+    for bad in (STARS.astype(np.uint16), np.zeros((0, 4), np.uint8), np.zeros((4, 4, 2), np.uint8)):
+        with pytest.raises(ValueError, match="picture of"):
+            to_mono(bad)
+
+
+def test_a_camera_frame_is_grey():
+    with pytest.raises(ValueError, match="height, width"):
+        CameraFrame(np.zeros((4, 4, 3), np.uint8), 0, 0)
+
+
+def test_the_exposure_lies_its_delay_before_the_arrival():
+    delay = ExposureDelay(delay_s=0.0625, delay_std_s=0.002)
+    assert delay.middle_ns(1_000_000_000) == 937_500_000
+    for bad in (-0.1, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="delay_std_s"):
+            ExposureDelay(0.0, bad)
+        with pytest.raises(ValueError, match="delay_s"):
+            ExposureDelay(bad, 0.0)

@@ -1,0 +1,296 @@
+import socket
+import threading
+import time
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.errors import LinkLost, NotFound
+from drivers.star_camera.port import StarCamera
+from drivers.star_camera.source import FolderSource, Picture, VideoSource
+
+PATIENCE_S = 20.0  # only a failing test waits so long
+
+
+def picture(value):
+    return np.full((24, 32), value, np.uint8)
+
+
+def raw_part(image, number):
+    head = (
+        "--frame\r\nContent-Type: application/x-mono8\r\n"
+        f"X-Width: {image.shape[1]}\r\nX-Height: {image.shape[0]}\r\nX-Sequence: {number}\r\n"
+        f"Content-Length: {image.size}\r\n\r\n"
+    )
+    return head.encode() + image.tobytes() + b"\r\n"
+
+
+def jpeg_part(body):
+    return b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(body) + body + b"\r\n"
+
+
+class Script:
+    """What the server sends, in order; an Event in it makes the server wait."""
+
+    def __init__(self, *steps, content_type="multipart/x-mixed-replace; boundary=frame", status=200):
+        self.steps, self.content_type, self.status = steps, content_type, status
+        self.over = threading.Event()
+
+
+@contextmanager
+def serve(script):
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(script.status)
+            self.send_header("Content-Type", script.content_type)
+            self.end_headers()
+            for step in script.steps:
+                if isinstance(step, threading.Event):
+                    step.wait(PATIENCE_S)
+                else:
+                    self.wfile.write(step)
+            self.close_connection = True
+
+        def log_message(self, *args):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = False
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/alpha.raw"
+    finally:
+        script.over.set()
+        for step in script.steps:
+            if isinstance(step, threading.Event):
+                step.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+class Hand:
+    """A source that a test feeds picture by picture."""
+
+    def __init__(self):
+        self.name, self.garbled, self.is_closed = "by hand", 0, False
+        self._given, self._asked = threading.Semaphore(0), threading.Semaphore(0)
+        self._next, self.age_ns = [], 0
+
+    def give(self, *pictures):
+        """Return when the port has taken all of them and asks for more."""
+        for item in pictures:
+            self._asked.acquire()
+            self._next.append(item)
+            self._given.release()
+        self._asked.acquire()
+        self._asked.release()
+
+    def read(self):
+        self._asked.release()
+        self._given.acquire()
+        if self.is_closed:
+            raise LinkLost("closed")
+        item = self._next.pop(0)
+        if isinstance(item, Exception):
+            raise item
+        return Picture(picture(item), time.monotonic_ns() - self.age_ns)
+
+    def close(self):
+        self.is_closed = True
+        self._given.release()
+
+
+def test_a_slow_consumer_sees_the_newest_picture_only():
+    hand = Hand()
+    with StarCamera(hand) as camera:
+        hand.give(1, 2, 3, 4, 5)
+        frame = camera.read()
+        assert (frame.image[0, 0], frame.sequence) == (5, 4)
+        assert camera.read(timeout_s=0.0) is None
+        hand.give(6)
+        assert camera.read().image[0, 0] == 6
+        assert (camera.counters.received, camera.counters.skipped) == (6, 4)
+
+
+def test_a_picture_is_read_once_and_its_stamp_is_its_arrival():
+    hand = Hand()
+    with StarCamera(hand) as camera:
+        before_ns = time.monotonic_ns()
+        hand.give(1)
+        frame = camera.read()
+        assert before_ns <= frame.stamp_arrival_ns <= time.monotonic_ns()
+
+
+def test_a_silent_source_is_a_lost_link():
+    hand = Hand()
+    with StarCamera(hand, silence_s=0.05) as camera, pytest.raises(LinkLost, match=r"no picture for 0\.05 s"):
+        camera.read()
+
+
+def test_the_last_picture_of_a_dead_link_is_not_shown_when_it_is_old():
+    hand = Hand()
+    hand.age_ns = 3_000_000_000
+    with StarCamera(hand) as camera:
+        hand.give(1)
+        assert camera.read(timeout_s=0.0) is None
+        assert (camera.counters.received, camera.counters.skipped) == (1, 1)
+
+
+def test_what_ends_the_source_reaches_the_reader_after_the_last_picture():
+    hand = Hand()
+    with StarCamera(hand) as camera:
+        hand.give(1)
+        camera.read()
+        hand._asked.acquire()
+        hand._next.append(LinkLost("the cable is out"))
+        hand._given.release()
+        for _ in range(2):
+            with pytest.raises(LinkLost, match="the cable is out"):
+                camera.read()
+
+
+def test_closing_ends_a_waiting_reader_and_the_thread():
+    hand = Hand()
+    camera = StarCamera(hand)
+    told = []
+
+    def wait_for_a_picture():
+        with pytest.raises(LinkLost, match="closed"):
+            camera.read()
+        told.append(True)
+
+    reader = threading.Thread(target=wait_for_a_picture)
+    reader.start()
+    camera.close()
+    camera.close()
+    reader.join()
+    assert told == [True]
+    assert not camera._thread.is_alive()
+
+
+def test_raw_pictures_over_http_are_exact_and_keep_the_senders_count():
+    on, done = threading.Event(), threading.Event()
+    script = Script(raw_part(picture(7), 41), on, raw_part(picture(8), 44), done)
+    with serve(script) as url, StarCamera.open(url) as camera:
+        first = camera.read()
+        on.set()
+        second = camera.read()
+    assert np.array_equal(first.image, picture(7))
+    assert (first.sequence, second.sequence, second.image[0, 0]) == (41, 44, 8)
+
+
+def test_jpeg_over_http_works_and_a_truncated_one_is_counted():
+    stars = picture(0)
+    stars[10, 12] = 255
+    whole = cv2.imencode(".jpg", stars)[1].tobytes()
+    done = threading.Event()
+    script = Script(jpeg_part(whole[: len(whole) // 2]), jpeg_part(whole), done)
+    with serve(script) as url, StarCamera.open(url) as camera:
+        frame = camera.read()
+        assert np.unravel_index(frame.image.argmax(), frame.image.shape) == (10, 12)
+        assert camera.counters.garbled == 1
+
+
+def test_garbage_between_pictures_is_survived():
+    done = threading.Event()
+    noise = np.random.default_rng(3).integers(0, 256, 5000, np.uint8).tobytes()
+    with serve(Script(noise, raw_part(picture(9), 0), done)) as url, StarCamera.open(url) as camera:
+        assert camera.read().image[0, 0] == 9
+
+
+def test_a_server_that_falls_silent_is_a_lost_link():
+    done = threading.Event()
+    with serve(Script(raw_part(picture(1), 0), done)) as url, StarCamera.open(url, silence_s=0.2) as camera:
+        camera.read()
+        with pytest.raises(LinkLost, match=url):
+            camera.read()
+
+
+def test_a_server_that_sends_only_garbage_is_a_lost_link():
+    done = threading.Event()
+    with (
+        serve(Script(b"no picture at all" * 1000, done)) as url,
+        StarCamera.open(url, silence_s=0.2) as camera,
+        pytest.raises(LinkLost, match=url),
+    ):
+        camera.read()
+
+
+def test_a_server_that_ends_is_a_lost_link():
+    with serve(Script(raw_part(picture(1), 0))) as url, StarCamera.open(url) as camera:
+        camera._thread.join()
+        camera.read()
+        with pytest.raises(LinkLost, match="ended its stream"):
+            camera.read()
+
+
+def test_a_dead_server_is_not_found():
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        with pytest.raises(NotFound, match="does not answer"):
+            StarCamera.open(f"http://127.0.0.1:{nobody.getsockname()[1]}/")
+
+
+def test_a_server_that_accepts_and_says_nothing_is_not_found():
+    with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(NotFound, match="does not answer"):
+        StarCamera.open(f"http://127.0.0.1:{mute.getsockname()[1]}/", silence_s=0.1)
+
+
+@pytest.mark.parametrize(
+    "script", [Script(content_type="text/html"), Script(status=404)], ids=["html", "404"]
+)
+def test_a_server_without_a_picture_stream_is_not_found(script):
+    with serve(script) as url, pytest.raises(NotFound, match="no picture stream"):
+        StarCamera.open(url)
+
+
+def test_an_impossible_url_is_not_found():
+    with pytest.raises(NotFound, match="does not answer"):
+        StarCamera.open("http://127.0.0.1:99999/")
+
+
+def test_a_folder_plays_its_files_in_order_and_ends(tmp_path):
+    for number in (2, 1, 3):
+        cv2.imwrite(str(tmp_path / f"{number:05d}.png"), picture(number))
+    (tmp_path / "00002b.png").write_bytes(b"no picture")
+    source = FolderSource(tmp_path, rate_hz=10_000.0)
+    assert [source.read().image[0, 0] for _ in range(3)] == [1, 2, 3]
+    assert source.garbled == 1
+    with pytest.raises(LinkLost, match="no more pictures"):
+        source.read()
+
+
+def test_a_folder_is_opened_by_its_path_and_closed_while_it_waits(tmp_path):
+    for number in range(2):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), picture(number))
+    with StarCamera.open(str(tmp_path), rate_hz=0.01, silence_s=PATIENCE_S) as camera:
+        assert camera.read().image[0, 0] == 0
+
+
+def test_an_empty_folder_is_not_found(tmp_path):
+    with pytest.raises(NotFound, match="no PNG"):
+        StarCamera.open(str(tmp_path))
+
+
+def test_a_video_file_is_read_through_opencv(tmp_path):
+    path = str(tmp_path / "sky.avi")
+    writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (32, 24))
+    for value in (40, 200):
+        writer.write(np.dstack([picture(value)] * 3))
+    writer.release()
+    source = VideoSource(path, timeout_s=1.0)
+    values = [int(source.read().image[0, 0]) for _ in range(2)]
+    assert np.allclose(values, [40, 200], atol=3)
+    with pytest.raises(LinkLost, match="no more pictures"):
+        source.read()
+    source.close()
+
+
+def test_a_missing_device_is_not_found():
+    with pytest.raises(NotFound, match="video 77"):
+        StarCamera.open("77")
