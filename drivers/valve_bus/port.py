@@ -21,7 +21,7 @@ from drivers.valve_bus.protocol import ARM_ID, COMMAND_ID, FLOAT_AIR_ID, STOP_ID
 _VEHICLE_BITS = 0x00F
 _STATION_IDS = frozenset((STOP_ID, ARM_ID, FLOAT_AIR_ID, COMMAND_ID))  # sent by the station, obeyed by nodes
 _SLICE_S = 0.1  # `frames` looks for a close this often
-_OPEN_ERRORS = (can.CanError, OSError, ValueError, TypeError, ImportError)
+_OPEN_ERRORS = (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError)
 
 
 @dataclass(slots=True)
@@ -122,9 +122,8 @@ class ValveBusPort:
         if self._closing.is_set():
             return
         self._closing.set()
-        # Closing a dead adapter fails again, which is no news to somebody who closes it.
-        with self._reading, self._sending, suppress(can.CanError, OSError):
-            self._bus.shutdown()
+        with self._reading, self._sending:
+            _shut_down(self._bus)
 
     def __enter__(self) -> Self:
         return self
@@ -140,13 +139,15 @@ class ValveBusPort:
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:
             return self._bus.recv(min(timeout_s, _SLICE_S))
-        except (ValueError, IndexError) as error:  # slcan: a line of noise
+        except (ValueError, IndexError):  # slcan: a line of noise
             self.counters.garbled += 1
-            if isinstance(error, UnicodeDecodeError) and isinstance(self._bus, slcanBus):
-                self._bus.flush()  # else its buffer keeps that line and fails at every next one
             return None
         except (can.CanError, OSError) as error:
-            raise LinkLost(f"the valve bus on {self.name} is lost: {error}") from error
+            if not isinstance(error.__cause__, UnicodeDecodeError) or not isinstance(self._bus, slcanBus):
+                raise LinkLost(f"the valve bus on {self.name} is lost: {error.__cause__ or error}") from error
+            self.counters.garbled += 1
+            self._bus.flush()  # else its buffer keeps that line and fails at every next one
+            return None
 
     def _accept(self, message: can.Message) -> CanFrame | None:
         if message.is_error_frame or message.is_remote_frame or message.is_extended_id or message.is_fd:
@@ -182,3 +183,15 @@ def _make_prompt(bus: can.BusABC) -> None:
     if str(port.port).startswith("socket://"):
         with socket.socket(fileno=os.dup(port.fileno())) as same_socket:
             same_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def _shut_down(bus: can.BusABC) -> None:
+    """On a dead link slcan gives up before it closes its port, and pyserial before it closes its socket."""
+    port = getattr(bus, "serialPortOrig", None)
+    open_socket = getattr(port, "_socket", None)
+    with suppress(can.CanError, OSError):  # that the adapter is dead is no news to somebody who closes it
+        bus.shutdown()
+    if port is not None:
+        port.close()
+    if open_socket is not None:
+        open_socket.close()

@@ -1,0 +1,173 @@
+import queue
+import socket
+import threading
+from contextlib import contextmanager
+
+import can
+import pytest
+
+from drivers.errors import LinkLost, NotFound
+from drivers.valve_bus.port import ValveBusPort
+from drivers.valve_bus.protocol import CanFrame, FloatAir, ValveCommand, decode, encode
+
+PATIENCE_S = 20.0
+STATUS = CanFrame(0x181, bytes.fromhex("815399000802"))
+COMMAND = encode(ValveCommand(1, 3, 5, (10, 0, 127, 0, 0, 50, 0, 1)))
+
+
+class Adapter:
+    """The far side of a slcan adapter behind a socket: lines in, lines out (Lawicel ASCII)."""
+
+    def __init__(self, server):
+        self.lines = queue.Queue()
+        self.connected = threading.Event()
+        self._server = server
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self):
+        self._client, _ = self._server.accept()
+        self.connected.set()
+        with self._client.makefile("rb") as stream:
+            line = bytearray()
+            while byte := stream.read(1):
+                if byte == b"\r":
+                    self.lines.put(bytes(line))
+                    line.clear()
+                else:
+                    line += byte
+
+    def say(self, data):
+        assert self.connected.wait(PATIENCE_S)
+        self._client.sendall(data)
+
+    def hang_up(self):
+        self.connected.wait(PATIENCE_S)
+        self._client.shutdown(socket.SHUT_RDWR)
+
+    def close(self):
+        self._thread.join(PATIENCE_S)
+        self._client.close()
+
+
+@contextmanager
+def slcan():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        adapter = Adapter(server)
+        config = {
+            "interface": "slcan",
+            "channel": f"socket://127.0.0.1:{server.getsockname()[1]}",
+            "bitrate": 500000,
+        }
+        with ValveBusPort(config) as port:
+            yield port, adapter
+        adapter.close()
+
+
+@pytest.fixture
+def bus():
+    """A port and the node at the other end of a virtual bus."""
+    config = {"interface": "virtual", "channel": "valves of a test"}
+    with ValveBusPort(config) as port, can.Bus(**config, ignore_config=True) as node:
+        yield port, node
+
+
+def test_frames_pass_both_ways(bus):
+    port, node = bus
+    port.send(COMMAND)
+    heard = node.recv(PATIENCE_S)
+    assert CanFrame(heard.arbitration_id, bytes(heard.data)) == COMMAND
+    assert not heard.is_extended_id
+    node.send(can.Message(arbitration_id=STATUS.arbitration_id, data=STATUS.data, is_extended_id=False))
+    stamp_ns, frame = port.read(PATIENCE_S)
+    assert frame == STATUS
+    assert stamp_ns > 0
+    assert (port.counters.sent, port.counters.received) == (1, 1)
+
+
+def test_nothing_in_time_is_none(bus):
+    assert bus[0].read(0.0) is None
+
+
+def test_what_a_station_said_and_what_is_no_data_frame_is_passed_over(bus):
+    port, node = bus
+    for echo in (COMMAND, encode(FloatAir(1, is_on=True))):
+        node.send(can.Message(arbitration_id=echo.arbitration_id, data=echo.data, is_extended_id=False))
+    node.send(can.Message(arbitration_id=0x181, is_extended_id=True, data=STATUS.data))
+    node.send(can.Message(arbitration_id=0x181, is_extended_id=False, is_remote_frame=True))
+    node.send(can.Message(arbitration_id=0x181, data=STATUS.data, is_extended_id=False))
+    assert port.read(PATIENCE_S)[1] == STATUS
+    assert (port.counters.own_echoes, port.counters.foreign) == (2, 2)
+
+
+def test_closing_ends_the_frames_of_another_thread():
+    port = ValveBusPort({"interface": "virtual", "channel": "a bus to be closed"})
+    frames = []
+    reader = threading.Thread(target=lambda: frames.extend(port.frames()))
+    reader.start()
+    port.close()
+    port.close()
+    reader.join(PATIENCE_S)
+    assert not reader.is_alive()
+    assert frames == []
+    for use in (lambda: port.read(0.0), lambda: port.send(COMMAND)):
+        with pytest.raises(LinkLost, match="is closed"):
+            use()
+
+
+@pytest.mark.parametrize("missing", ["interface", "channel"])
+def test_a_missing_key_is_named(missing):
+    config = {"interface": "virtual", "channel": "x"}
+    del config[missing]
+    with pytest.raises(ValueError, match=missing):
+        ValveBusPort(config)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"interface": "no such interface", "channel": "x"},
+        {"interface": "slcan", "channel": "/dev/no_such_tty", "sleep_after_open": 0.0},
+        {"interface": "slcan", "channel": "socket://nowhere"},
+    ],
+    ids=lambda config: config["channel"],
+)
+def test_an_adapter_that_is_not_there_is_not_found(config):
+    with pytest.raises(NotFound, match="cannot be opened"):
+        ValveBusPort(config)
+
+
+def test_a_slcan_adapter_behind_a_socket_is_opened_used_and_left():
+    with slcan() as (port, adapter):
+        port.send(COMMAND)
+        port.send(COMMAND)
+        lines = [adapter.lines.get(timeout=PATIENCE_S) for _ in range(6)]
+        assert b"S6" in lines  # 500 kbit/s
+        assert b"O" in lines
+        while lines[-1][:1] != b"t":
+            lines.append(adapter.lines.get(timeout=PATIENCE_S))
+        assert lines[-1] == b"t1018530AC01F00900102"
+        adapter.say(b"\rz\rt1816815399000802\r")
+        assert port.read(PATIENCE_S)[1] == STATUS
+        assert decode(STATUS).is_armed
+
+
+@pytest.mark.parametrize(
+    "noise", [b"t18\r", b"tzzz1\r", b"\xff\xfe\xfd\r", b"t1819" + b"00" * 9 + b"\r", b"tFFF0\r"]
+)
+def test_noise_on_the_adapters_line_is_counted(noise):
+    with slcan() as (port, adapter):
+        adapter.say(noise)
+        while not port.counters.garbled:
+            assert port.read(0.1) is None
+        adapter.say(b"t1816815399000802\r")
+        assert port.read(PATIENCE_S)[1] == STATUS
+        assert port.counters.garbled == 1
+
+
+def test_an_adapter_that_hangs_up_is_a_lost_link():
+    with slcan() as (port, adapter):
+        adapter.hang_up()
+        with pytest.raises(LinkLost, match="is lost"):
+            for _ in port.frames():
+                pass
