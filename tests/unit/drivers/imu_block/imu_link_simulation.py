@@ -38,7 +38,9 @@ class Link:
         done_s = (starts_s[:, None] + byte_s * (1 + np.arange(size))[None, :]).ravel()
         stream = b"".join(self._frame(int(tick), index) for index, tick in enumerate(ticks))
         arrivals_s, ends = self._through_the_chip(done_s)
-        arrivals_s = arrivals_s + rng.exponential(self.jitter_s, len(arrivals_s)) if self.jitter_s else arrivals_s
+        arrivals_s = (
+            arrivals_s + rng.exponential(self.jitter_s, len(arrivals_s)) if self.jitter_s else arrivals_s
+        )
         if self.stall_every_s:
             in_stall = (arrivals_s % self.stall_every_s) < self.stall_s
             released = (arrivals_s // self.stall_every_s) * self.stall_every_s + self.stall_s
