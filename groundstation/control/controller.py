@@ -32,7 +32,8 @@ class Controller(Protocol):
             dt_s: Time since the last update; the first one may state the nominal period.
             applied: Mean wrench that acted since the last update, where it is known (delivered pulses, zero
                 while disarmed); None means the wrench returned last.
-            neighbours: Newest states of other mock-ups by name; leave out those that are stale.
+            neighbours: States of other mock-ups by name, carried to the present
+                (`ControlState.carried`); leave out those that are stale.
 
         Returns:
             A wrench that the valves can make, body axes.

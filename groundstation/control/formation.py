@@ -17,16 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.state import (
-    ControlState,
-    Goal,
-    Vector2,
-    Wrench,
-    clamp,
-    limit_length,
-    rotate,
-)
-from groundstation.control.station import LENGTH_BOUND_M, SPEED_BOUND
+from groundstation.control.state import ControlState, Goal, Vector2, Wrench, rotate
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -89,7 +80,8 @@ class Formation:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> Wrench:
         """See `Controller.update`."""
-        setpoint = self._setpoint(goal, neighbours)
+        state = state.bounded()
+        setpoint = self._setpoint(goal.bounded(), neighbours)
         if setpoint is None:
             # never heard of anybody: stay where we are
             setpoint = self._held or Goal(state.position_table_m, state.heading_rad)
@@ -104,7 +96,7 @@ class Formation:
             asked.append((self._config.goal_weight, goal))
         for name, relative in self._config.neighbours.items():
             if name in neighbours:
-                asked.append((relative.weight, _asked_by(neighbours[name], relative, goal)))
+                asked.append((relative.weight, _asked_by(neighbours[name].bounded(), relative, goal)))
         if not asked:
             return None
         total = math.fsum(weight for weight, _ in asked)
@@ -113,9 +105,9 @@ class Formation:
         first_rad = asked[0][1].heading_rad
         turn_rad = math.fsum(share * wrap_angle(wanted.heading_rad - first_rad) for share, wanted in shares)
         return Goal(
-            _mean([(share, wanted.position_table_m) for share, wanted in shares], LENGTH_BOUND_M),
+            _mean([(share, wanted.position_table_m) for share, wanted in shares]),
             wrap_angle(first_rad + turn_rad),
-            _mean([(share, wanted.velocity_table_m_s) for share, wanted in shares], SPEED_BOUND),
+            _mean([(share, wanted.velocity_table_m_s) for share, wanted in shares]),
             math.fsum(share * wanted.rate_rad_s for share, wanted in shares),
         )
 
@@ -126,18 +118,15 @@ def _asked_by(neighbour: ControlState, relative: RelativePose, goal: Goal) -> Go
     turn_rad = math.radians(relative.heading_deg)
     if not relative.carried:
         place = (x + relative.offset_m[0], y + relative.offset_m[1])
-        return Goal(
-            place, wrap_angle(goal.heading_rad) + turn_rad, neighbour.velocity_table_m_s, goal.rate_rad_s
-        )
-    heading_rad = wrap_angle(neighbour.heading_rad)
+        return Goal(place, goal.heading_rad + turn_rad, neighbour.velocity_table_m_s, goal.rate_rad_s)
+    heading_rad, rate, velocity = neighbour.heading_rad, neighbour.rate_rad_s, neighbour.velocity_table_m_s
     lever = rotate(relative.offset_m, heading_rad)
-    rate = clamp(neighbour.rate_rad_s, SPEED_BOUND)
-    velocity = neighbour.velocity_table_m_s
     carried = (velocity[0] - rate * lever[1], velocity[1] + rate * lever[0])
     return Goal((x + lever[0], y + lever[1]), heading_rad + turn_rad, carried, rate)
 
 
-def _mean(shares: list[tuple[float, Vector2]], limit: float) -> Vector2:
-    x = math.fsum(share * value[0] for share, value in shares)
-    y = math.fsum(share * value[1] for share, value in shares)
-    return limit_length((x, y), limit)
+def _mean(shares: list[tuple[float, Vector2]]) -> Vector2:
+    return (
+        math.fsum(share * value[0] for share, value in shares),
+        math.fsum(share * value[1] for share, value in shares),
+    )

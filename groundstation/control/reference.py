@@ -12,14 +12,21 @@ from dataclasses import dataclass
 from groundstation.control.state import Vector2, limit_length
 
 _BRAKING_SHARE = 0.9  # of the acceleration: what is left corrects the last steps
+_ARRIVAL_SHARE = 0.1  # of the capture distance: a step that station keeping does not notice
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Largest speed and acceleration of a reference, in metres or radians."""
+    """Largest speed and acceleration of a reference, in metres or radians.
+
+    A goal that was reached and then jumps by less than `capture` is taken over at once: a neighbour's
+    estimate jumps by millimetres at each star fix, and planning a way across each jump would only shake the
+    valves.
+    """
 
     speed: float
     acceleration: float
+    capture: float = 0.0
 
 
 def approach_speed(distance: float, acceleration: float, dt_s: float) -> float:
@@ -52,7 +59,10 @@ class PointReference:
         distance = math.hypot(*way)
         relative = (self.velocity[0] - goal_velocity[0], self.velocity[1] - goal_velocity[1])
         step = limits.acceleration * dt_s
-        if distance <= 0.5 * step * dt_s and math.hypot(*relative) <= step:
+        # hysteresis: arriving needs a tenth of what losing a reached goal does
+        capture = limits.capture * (1.0 if self.is_at_goal else _ARRIVAL_SHARE)
+        reach = max(step, math.sqrt(2.0 * limits.acceleration * capture))
+        if distance <= max(capture, 0.5 * step * dt_s) and math.hypot(*relative) <= reach:
             self._arrive(goal, goal_velocity)
             return
         self.is_at_goal = False

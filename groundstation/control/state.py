@@ -4,7 +4,12 @@ Tuples of floats rather than arrays: the law runs on three axes, and an array of
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from groundstation.frames import wrap_angle
+
+LENGTH_BOUND_M = 1e6  # far beyond any table: keeps sums finite whatever comes in
+SPEED_BOUND = 1e3  # m/s, rad/s and their derivatives: nothing on a table is faster
 
 Vector2 = tuple[float, float]
 """Two components along x and y of the frame that the name says."""
@@ -36,7 +41,7 @@ def bounded(vector: Vector2, limit: float) -> Vector2:
 
 
 def _refuse_non_finite(what: str, *values: float) -> None:
-    if not math.isfinite(math.fsum(map(abs, values))) and not all(map(math.isfinite, values)):
+    if not all(map(math.isfinite, values)):
         raise ValueError(f"{what} must be finite, found {values}")
 
 
@@ -69,6 +74,25 @@ class ControlState:
             self.heading_rad,
             self.rate_rad_s,
             *self.slope_table_m_s2,
+        )
+
+    def bounded(self) -> "ControlState":
+        """The same with absurd numbers cut to the bounds and the heading within [-pi, pi)."""
+        return ControlState(
+            bounded(self.position_table_m, LENGTH_BOUND_M),
+            bounded(self.velocity_table_m_s, SPEED_BOUND),
+            wrap_angle(self.heading_rad),
+            clamp(self.rate_rad_s, SPEED_BOUND),
+            bounded(self.slope_table_m_s2, SPEED_BOUND),
+        )
+
+    def carried(self, span_s: float) -> "ControlState":
+        """The same after coasting for a while: brings a late state to the present."""
+        (x, y), (speed_x, speed_y) = self.position_table_m, self.velocity_table_m_s
+        return replace(
+            self,
+            position_table_m=(x + speed_x * span_s, y + speed_y * span_s),
+            heading_rad=self.heading_rad + self.rate_rad_s * span_s,
         )
 
 
@@ -104,6 +128,17 @@ class Goal:
             self.rate_rad_s,
             *self.acceleration_table_m_s2,
             self.angular_acceleration_rad_s2,
+        )
+
+    def bounded(self) -> "Goal":
+        """The same with absurd numbers cut to the bounds and the heading within [-pi, pi)."""
+        return Goal(
+            bounded(self.position_table_m, LENGTH_BOUND_M),
+            wrap_angle(self.heading_rad),
+            bounded(self.velocity_table_m_s, SPEED_BOUND),
+            clamp(self.rate_rad_s, SPEED_BOUND),
+            bounded(self.acceleration_table_m_s2, SPEED_BOUND),
+            clamp(self.angular_acceleration_rad_s2, SPEED_BOUND),
         )
 
 

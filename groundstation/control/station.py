@@ -20,7 +20,6 @@ from groundstation.control.state import (
     Goal,
     Vector2,
     Wrench,
-    bounded,
     clamp,
     limit_length,
     rotate,
@@ -28,8 +27,6 @@ from groundstation.control.state import (
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
-SPEED_BOUND = 1e3  # m/s or rad/s: keeps sums finite whatever comes in; nothing on a table is faster
-LENGTH_BOUND_M = 1e6  # the same for positions
 LONGEST_SPAN_S = 1.0  # after a longer gap the observer takes the measurement as it is
 
 
@@ -104,28 +101,23 @@ class StationKeeping:
         """See `Controller.update`; neighbours are not looked at."""
         if not (math.isfinite(dt_s) and dt_s > 0.0):
             raise ValueError(f"dt_s must be above 0, found {dt_s}")
+        state, goal = state.bounded(), goal.bounded()
         self._observe(state, self._last if applied is None else applied, min(dt_s, LONGEST_SPAN_S))
-        force = rotate(self._force_table_n(state, goal), -wrap_angle(state.heading_rad))
+        force = rotate(self._force_table_n(state, goal), -state.heading_rad)
         self._last = self._envelope.saturate(Wrench(force, self._torque_nm(state, goal)))
         return self._last
 
     def _observe(self, state: ControlState, applied: Wrench, dt_s: float) -> None:
         mass_kg = self._vehicle.mass_kg
         acted = self._envelope.saturate(applied)
-        push = rotate(acted.force_body_n, wrap_angle(state.heading_rad))
-        slope = bounded(state.slope_table_m_s2, SPEED_BOUND)
-        speed = bounded(state.velocity_table_m_s, SPEED_BOUND)
-        self._x.update(speed[0], push[0] / mass_kg + slope[0], dt_s)
-        self._y.update(speed[1], push[1] / mass_kg + slope[1], dt_s)
-        rate = clamp(state.rate_rad_s, SPEED_BOUND)
-        self._turn.update(rate, acted.torque_nm / self._vehicle.inertia_kg_m2, dt_s)
+        push, slope = rotate(acted.force_body_n, state.heading_rad), state.slope_table_m_s2
+        self._x.update(state.velocity_table_m_s[0], push[0] / mass_kg + slope[0], dt_s)
+        self._y.update(state.velocity_table_m_s[1], push[1] / mass_kg + slope[1], dt_s)
+        self._turn.update(state.rate_rad_s, acted.torque_nm / self._vehicle.inertia_kg_m2, dt_s)
 
     def _force_table_n(self, state: ControlState, goal: Goal) -> Vector2:
-        here = bounded(state.position_table_m, LENGTH_BOUND_M)
-        there = bounded(goal.position_table_m, LENGTH_BOUND_M)
-        wanted = bounded(goal.velocity_table_m_s, SPEED_BOUND)
-        forward = bounded(goal.acceleration_table_m_s2, SPEED_BOUND)
-        slope = bounded(state.slope_table_m_s2, SPEED_BOUND)
+        here, there = state.position_table_m, goal.position_table_m
+        wanted, forward, slope = goal.velocity_table_m_s, goal.acceleration_table_m_s2, state.slope_table_m_s2
         error = limit_length((there[0] - here[0], there[1] - here[1]), self._config.largest_error_m)
         stiffness, damping = self._gains.stiffness_per_s2, self._gains.damping_per_s
         feedback = _shrink(
@@ -142,14 +134,12 @@ class StationKeeping:
         )
 
     def _torque_nm(self, state: ControlState, goal: Goal) -> float:
-        # each angle is wrapped first: the difference of two huge ones would lose the heading
-        error = wrap_angle(wrap_angle(goal.heading_rad) - wrap_angle(state.heading_rad))
-        feedback = self._heading_gains.stiffness_per_s2 * clamp(error, self._heading_limit_rad)
-        wanted = clamp(goal.rate_rad_s, SPEED_BOUND)
-        feedback += self._heading_gains.damping_per_s * (wanted - self._turn.speed)
+        error = clamp(wrap_angle(goal.heading_rad - state.heading_rad), self._heading_limit_rad)
+        feedback = self._heading_gains.stiffness_per_s2 * error
+        feedback += self._heading_gains.damping_per_s * (goal.rate_rad_s - self._turn.speed)
         feedback = math.copysign(max(0.0, abs(feedback) - self._heading_deadband_rad_s2), feedback)
-        forward = clamp(goal.angular_acceleration_rad_s2, SPEED_BOUND)
-        return self._vehicle.inertia_kg_m2 * (feedback + forward - self._turn.disturbance)
+        wanted = feedback + goal.angular_acceleration_rad_s2 - self._turn.disturbance
+        return self._vehicle.inertia_kg_m2 * wanted
 
 
 def _shrink(vector: Vector2, deadband: float) -> Vector2:
