@@ -19,6 +19,7 @@ class Kind(IntEnum):
     OUTPUT = 3  # the node said (topic, owner, sequence)
     DROP = 4  # (topic, owner, sequence) was replaced by a newer one before the node took it
     PORT = 5  # a port of the process turned something outside into (topic, owner, sequence)
+    STOP = 6  # the node was told that its process ends
 
 
 ENTRY = np.dtype(

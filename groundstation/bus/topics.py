@@ -82,8 +82,8 @@ def _row(
 
 _ROWS = (
     # what must be judged first at equal stamps stands first: requests and valves before sensors
-    _row("request", m.Request, 0),
-    _row("ack", m.Ack, 0),
+    _row("request", m.Request, 0, scope=Scope.PROCESS),
+    _row("ack", m.Ack, 0, scope=Scope.PROCESS),
     _row("can_in", m.CanIn, 100, scope=Scope.RIG),
     _row("valve_status", m.ValveStatus, 50),
     _row("vehicle_mode", m.VehicleMode, 0, latched=True),

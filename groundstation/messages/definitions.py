@@ -23,6 +23,7 @@ from groundstation.messages.base import (
 )
 
 PACKAGE = "air_table_msgs"
+NO_STOP = 255
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +76,7 @@ class StarSpots(Message):
     """Spots of light found in one frame; stamp and vehicle are the frame's.
 
     Attributes:
+        arrival_ns: When the frame reached the node that looked into it.
         u_px: Column of each centre, pixel (0, 0) is the centre of the top-left pixel.
         v_px: Row of each centre.
         flux: Light above the background, in grey levels times pixels.
@@ -86,6 +88,7 @@ class StarSpots(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarSpots"
+    arrival_ns: I64
     u_px: Float32Array
     v_px: Float32Array
     flux: Float32Array
@@ -268,37 +271,59 @@ class ValveDemand(Message):
     """On-times of the next modulation period, as the allocation asks for them.
 
     Attributes:
-        pulse_id: Counts the periods, modulo 16.
         on_time_ms: Per valve, 0 to 127.
+        delivered_force_body_n: Mean force that these pulses are expected to give over the period.
+        delivered_torque_nm: Mean torque, likewise.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveDemand"
-    pulse_id: U8
     on_time_ms: Bytes
+    delivered_force_body_n: Float64x2
+    delivered_torque_nm: F64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ValveSelection(Message):
-    """What the command multiplexer chose, and whose it is."""
+    """What the command multiplexer chose, and whose it is.
+
+    Attributes:
+        counter: Of the selections said, modulo 16.
+        pulse_id: Changes with every new pulse, modulo 16.
+        on_time_ms: Per valve, 0 to 127.
+        source: ``stop``, ``brake``, ``operator``, ``controller`` or ``closed``.
+        reason: Why this source.
+    """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveSelection"
+    counter: U8
     pulse_id: U8
     on_time_ms: Bytes
     source: Text
     reason: Text
-    counter: U8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ValveCommand(Message):
-    """What the guard lets through; sent every 20 ms, closed unless armed and fresh."""
+    """What the guard lets through; sent every 20 ms, closed unless armed and fresh.
+
+    Attributes:
+        counter: Of the frames sent, modulo 16.
+        pulse_id: Of the guard's own pulses, modulo 16.
+        on_time_ms: Remaining on-time per valve.
+        gate: ``open``, or why the valves are closed.
+        open_mask: Bit i: valve i is open after this frame.
+        stop_reason: Code of the latched stop, ``NO_STOP`` without one.
+        arm: 0 nothing to say, 1 disarm the node, 2 arm it.
+    """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveCommand"
     counter: U8
     pulse_id: U8
     on_time_ms: Bytes
-    stop: Bool
-    reason: Text
+    gate: Text
+    open_mask: U8
+    stop_reason: U8
+    arm: U8
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -49,3 +49,8 @@ class Node(ABC):
         """Time passed; called every ``tick_period_ns``."""
         del now_ns
         return ()
+
+    def stop(self, now_ns: int) -> Iterable[Message]:
+        """The process ends in good order; last words, e.g. closed valves."""
+        del now_ns
+        return ()

@@ -1,0 +1,126 @@
+"""``groundstation run``: fly the vehicles of a rig, live or in lockstep."""
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from groundstation.cli.errors import UsageError
+from groundstation.cli.terminal_view import TerminalView
+from groundstation.runtime.live_run import LiveRun
+from groundstation.runtime.lockstep_run import run_lockstep
+from groundstation.runtime.node_table import check_processes
+from groundstation.runtime.report import write_report
+from groundstation.runtime.rig import load_rig
+
+app = typer.Typer(rich_markup_mode=None)
+
+REFRESH_S = 0.25
+LINE_EVERY_S = 1.0
+
+
+@app.command()
+def run(
+    rig: Annotated[Path, typer.Argument(help="Rig file (TOML).")],
+    duration: Annotated[
+        float | None, typer.Option(help="End by itself after this many seconds.", min=0.1)
+    ] = None,
+    headless: Annotated[bool, typer.Option("--headless", help="Write lines instead of a view.")] = False,
+    report: Annotated[Path | None, typer.Option(help="Leave figures and report.json here.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
+    lockstep: Annotated[
+        bool, typer.Option("--lockstep", help="Virtual time, as fast as the CPU allows; needs --duration.")
+    ] = False,
+    seed: Annotated[int | None, typer.Option(help="Of the emulated laboratory, in lockstep.")] = None,
+) -> None:
+    """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
+
+    Examples:
+      groundstation run examples/rigs/two_mock_ups.toml
+
+      groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
+    """
+    loaded = load_rig(rig)
+    check_processes(loaded)
+    if record is not None and record.exists():
+        raise UsageError(f"{record} is already there: recordings are never overwritten")
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
+    recording = record or loaded.record.directory / f"{stamp}.mcap"
+    if lockstep:
+        if duration is None:
+            raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
+        with _progress(duration) as update:
+            run_lockstep(loaded, rig, recording, duration, seed, update)
+    else:
+        if seed is not None:
+            raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
+        _run_live(LiveRun(loaded, rig, recording), duration, headless=headless or not sys.stdout.isatty())
+    print(f"recording: {recording}")
+    if report is not None:
+        with _progress(1.0) as update:
+            written = write_report(recording, report, update)
+        for path in written:
+            print(f"report: {path}")
+
+
+class _Ending:
+    """Ctrl-C and SIGTERM ask for the end; asked again, they change nothing."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(kind, self._ask)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        self.asked = True
+
+
+def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
+    ending = _Ending()
+    console = Console()
+    view = TerminalView(live, console)
+    try:
+        live.start(lambda: ending.asked)
+        until_s = None
+        next_line_s = 0.0
+        with view.opened(headless=headless):
+            while not ending.asked:
+                live.step(REFRESH_S)
+                now_s = time.monotonic()
+                if until_s is None and live.is_ready and duration is not None:
+                    until_s = now_s + duration
+                if until_s is not None and now_s >= until_s:
+                    break
+                if not headless:
+                    view.refresh()
+                elif now_s >= next_line_s:
+                    view.print_lines()
+                    next_line_s = now_s + LINE_EVERY_S
+    finally:
+        live.close()
+
+
+class _progress:  # noqa: N801 used like a function
+    """A bar on a terminal for what takes seconds; silent elsewhere."""
+
+    def __init__(self, total: float) -> None:
+        self._bar = Progress(
+            TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=Console(stderr=True)
+        )
+        self._bar.disable = not sys.stderr.isatty()
+        self._task = self._bar.add_task("", total=total)
+
+    def __enter__(self) -> Callable[[str, float], None]:
+        self._bar.start()
+        return lambda text, done: self._bar.update(self._task, description=text, completed=done)
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()

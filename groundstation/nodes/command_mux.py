@@ -1,0 +1,109 @@
+"""Command multiplexer: who may command the valves. Stop and brake > operator > controller."""
+
+from collections.abc import Iterator
+
+from groundstation.control.brake import BrakeConfig, brake_wrench
+from groundstation.control.envelope import WrenchEnvelope
+from groundstation.control.modulation import PulseModulator
+from groundstation.control.mux import CommandMux as Choice
+from groundstation.control.mux import MuxConfig, Selection, Source
+from groundstation.control.state import ControlState
+from groundstation.control.vehicle import VehicleModel
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import Ack, Request, ValveDemand, ValveSelection, VehicleState
+from groundstation.nodes.actions import answer, is_for, refusal
+from groundstation.nodes.node import Node
+
+PERIOD_NS = 20_000_000
+CLOSED = bytes(8)
+
+
+class CommandMux(Node):
+    """Says every 20 ms, and at once on a new demand, what the valves are to do and who wants it."""
+
+    inputs = (ValveDemand, VehicleState, Request)
+    outputs = (ValveSelection, Ack)
+
+    def __init__(
+        self,
+        vehicle: str,
+        config: MuxConfig,
+        brake: BrakeConfig,
+        model: VehicleModel,
+        modulator: PulseModulator,
+    ) -> None:
+        super().__init__(vehicle, PERIOD_NS)
+        self._choice: Choice[bytes] = Choice(config)
+        self._brake = brake
+        self._model = model
+        self._envelope = WrenchEnvelope(model)
+        self._modulator = modulator
+        self._brake_period_ns = round(modulator.config.period_s * 1e9)
+        self._brake_due_ns = 0
+        self._brake_asked = False
+        self._state: ControlState | None = None
+        self._counter = self._pulse_id = 0
+        self._on_time_ms = CLOSED
+        self._source: Source | None = None
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case ValveDemand():
+                self._choice.control(message.on_time_ms, now_ns)
+                yield self._select(now_ns)
+            case VehicleState(status="flying"):
+                self._state = ControlState(
+                    message.position_table_m,
+                    message.velocity_table_m_s,
+                    message.heading_rad,
+                    message.rate_rad_s,
+                )
+                self._choice.hear_state(now_ns)
+            case Request() if is_for(message, "command_mux"):
+                reason = refusal(message)
+                if not reason:
+                    self._brake_asked = message.action == "brake"
+                yield answer(message, now_ns, reason)
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        if self._brake_asked:
+            self._choice.brake(now_ns, "asked for by request")
+        yield self._select(now_ns)
+
+    def _select(self, now_ns: int) -> ValveSelection:
+        selection = self._choice.select(now_ns)
+        changed = selection.source is not self._source
+        self._source = selection.source
+        if selection.source is Source.BRAKE:
+            self._braking(now_ns, changed=changed)
+        elif selection.demand is None:
+            if changed:
+                self._pulse(CLOSED)
+        elif selection.is_new or changed:
+            self._pulse(selection.demand)
+        return self._say(selection, now_ns)
+
+    def _braking(self, now_ns: int, *, changed: bool) -> None:
+        if changed:
+            self._modulator.reset()
+            self._brake_due_ns = now_ns
+        if now_ns >= self._brake_due_ns and self._state is not None:
+            wrench = brake_wrench(self._state, self._brake, self._model, self._envelope)
+            self._pulse(bytes(self._modulator.update(wrench).on_time_ms))
+            self._brake_due_ns += self._brake_period_ns
+
+    def _pulse(self, on_time_ms: bytes) -> None:
+        self._on_time_ms = on_time_ms
+        self._pulse_id = (self._pulse_id + 1) % 16
+
+    def _say(self, selection: Selection[bytes], now_ns: int) -> ValveSelection:
+        self._counter = (self._counter + 1) % 16
+        return ValveSelection(
+            now_ns,
+            self.vehicle,
+            self._counter,
+            self._pulse_id,
+            self._on_time_ms,
+            selection.source.value,
+            selection.reason,
+        )

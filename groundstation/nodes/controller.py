@@ -1,0 +1,125 @@
+"""Controller: vehicle state in, wrench out, at the rate of the pulse modulation."""
+
+import math
+from collections.abc import Iterator
+
+from groundstation.control.controller import Controller as ControlLaw
+from groundstation.control.keep_in import KeepIn
+from groundstation.control.state import NO_WRENCH, ControlState, Goal
+from groundstation.control.state import Wrench as BodyWrench
+from groundstation.frames import wrap_angle
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import (
+    Ack,
+    ControlStatus,
+    Request,
+    ValveCommand,
+    ValveDemand,
+    VehicleState,
+    Wrench,
+)
+from groundstation.nodes.actions import answer, is_for, refusal
+from groundstation.nodes.node import Node
+
+STALE_NS = 300_000_000
+STATUS_EVERY = 2
+
+
+class Controller(Node):
+    """Runs the control law of the rig; says nothing while the state is stale or the vehicle is not flying.
+
+    Args:
+        vehicle: Its name.
+        law: A row of the table of controllers.
+        name: Of that row.
+        goal: Held from the start.
+        keep_in: Goals outside are refused.
+        neighbours: Other vehicles whose states the law wants.
+        period_s: Of the modulation.
+    """
+
+    inputs = (VehicleState, ValveDemand, ValveCommand, Request)
+    outputs = (Wrench, ControlStatus, Ack)
+
+    def __init__(
+        self,
+        vehicle: str,
+        law: ControlLaw,
+        name: str,
+        goal: Goal,
+        keep_in: KeepIn,
+        neighbours: tuple[str, ...],
+        period_s: float,
+    ) -> None:
+        super().__init__(vehicle, round(period_s * 1e9))
+        self._law = law
+        self._name = name
+        self._goal = goal
+        self._keep_in = keep_in
+        self._neighbours = neighbours
+        self._states: dict[str, tuple[int, ControlState]] = {}
+        self._gate_open = False
+        self._delivered = NO_WRENCH
+        self._ticks = 0
+
+    def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
+        if payload is VehicleState:
+            return (self.vehicle, *self._neighbours)
+        return (self.vehicle,)
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case VehicleState(status="flying"):
+                state = ControlState(
+                    message.position_table_m,
+                    message.velocity_table_m_s,
+                    message.heading_rad,
+                    message.rate_rad_s,
+                )
+                self._states[message.vehicle] = (now_ns, state)
+            case ValveDemand():
+                self._delivered = BodyWrench(message.delivered_force_body_n, message.delivered_torque_nm)
+            case ValveCommand():
+                is_open = message.gate == "open"
+                if is_open and not self._gate_open:
+                    self._law.reset()
+                self._gate_open = is_open
+            case Request() if is_for(message, "controller"):
+                yield answer(message, now_ns, self._go_to(message))
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        fresh = {name: state for name, (at, state) in self._states.items() if now_ns - at <= STALE_NS}
+        state = fresh.pop(self.vehicle, None)
+        if state is None:
+            return
+        wrench = self._law.update(
+            state,
+            self._goal,
+            self.tick_period_ns * 1e-9,
+            applied=self._delivered if self._gate_open else NO_WRENCH,
+            neighbours=fresh,
+        )
+        fx, fy = wrench.force_body_n
+        yield Wrench(now_ns, self.vehicle, fx, fy, 0.0, 0.0, 0.0, wrench.torque_nm)
+        self._ticks += 1
+        if self._ticks % STATUS_EVERY == 0:
+            yield self._status(state, now_ns)
+
+    def _go_to(self, request: Request) -> str:
+        """Take the goal, or say why not."""
+        reason = refusal(request)
+        if reason:
+            return reason
+        x, y, heading = request.argument
+        if min(self._keep_in.edge_distances_m((x, y))) < 0.0:
+            return f"({x:.3f}, {y:.3f}) m lies outside the part of the table that vehicles keep to"
+        self._goal = Goal((x, y), heading)
+        return ""
+
+    def _status(self, state: ControlState, now_ns: int) -> ControlStatus:
+        goal = self._goal
+        distance = math.dist(state.position_table_m, goal.position_table_m)
+        turn = wrap_angle(goal.heading_rad - state.heading_rad)
+        return ControlStatus(
+            now_ns, self.vehicle, self._name, goal.position_table_m, goal.heading_rad, distance, turn
+        )

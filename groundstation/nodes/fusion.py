@@ -1,0 +1,166 @@
+"""Fusion: IMU samples and late star fixes in, vehicle state out."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from groundstation.frames import wrap_angle
+from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
+from groundstation.fusion.estimator import FixAccount as Account
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import (
+    Diagnostics,
+    FixAccount,
+    FusionStatus,
+    Imu,
+    Request,
+    StarFix,
+    ValveStatus,
+    VehicleState,
+)
+from groundstation.nodes.node import Node
+
+STATUS_PERIOD_NS = 200_000_000
+ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
+DIAGNOSTICS_EVERY = 5
+
+
+class Fusion(Node):
+    """Feeds an estimator and tells it when the vehicle rests: landed, that is with the float air off.
+
+    Args:
+        vehicle: Its name.
+        estimator: A fresh one.
+        method: Its row in the table of estimators.
+        floor_std: What calibration leaves in every fix, beyond its own covariance: x, y (m), heading (rad).
+    """
+
+    inputs = (Imu, StarFix, ValveStatus, Request)
+    outputs = (VehicleState, FixAccount, FusionStatus, Diagnostics)
+
+    def __init__(
+        self, vehicle: str, estimator: Estimator, method: str, floor_std: tuple[float, float]
+    ) -> None:
+        super().__init__(vehicle, STATUS_PERIOD_NS)
+        self._estimator = estimator
+        self._method = method
+        self._floor = np.diag([floor_std[0] ** 2, floor_std[0] ** 2, floor_std[1] ** 2])
+        self._tick_ms: int | None = None
+        self._rest_since_ns: int | None = None
+        self._rest_ns = 0
+        self._float_ordered_ns = -ORDER_HOLDS_NS
+        self._state: PlanarState | None = None
+        self._fix_stamp_ns = 0
+        self._used = self._refused = self._ticks = 0
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case Imu():
+                yield from self._propagate(message)
+            case StarFix(fix=True):
+                yield from self._correct(message, now_ns)
+            case ValveStatus():
+                if message.floating or now_ns - self._float_ordered_ns >= ORDER_HOLDS_NS:
+                    self._hear_float(now_ns, floating=message.floating)
+            case Request(action="float_on"):
+                self._float_ordered_ns = now_ns
+                self._hear_float(now_ns, floating=True)
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        state = self._state
+        age_s = (now_ns - self._fix_stamp_ns) * 1e-9 if self._fix_stamp_ns else math.inf
+        biases = (
+            (0.0, 0.0, 0.0)
+            if state is None
+            else (state.bias_omega_rad_s, state.bias_ax_m_s2, state.bias_ay_m_s2)
+        )
+        yield FusionStatus(
+            now_ns,
+            self.vehicle,
+            _status(state),
+            self._method,
+            biases[0],
+            biases[1:],
+            self._rest_s(now_ns),
+            self._used,
+            self._refused,
+            age_s,
+        )
+        self._ticks += 1
+        if self._ticks % DIAGNOSTICS_EVERY == 0:
+            counters = self._estimator.counters.by_name
+            keys, values = tuple(counters), tuple(str(count) for count in counters.values())
+            yield Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/fusion", 0, "", keys, values)
+
+    def _propagate(self, imu: Imu) -> Iterator[Message]:
+        """Integrate with the MCU's ticks; stamps only place the sample against the camera."""
+        if not imu.valid:
+            return
+        before, self._tick_ms = self._tick_ms, imu.tick_ms
+        dt_s = imu.window_s if before is None or imu.tick_ms <= before else (imu.tick_ms - before) * 1e-3
+        packet = ImuPacket(imu.stamp_ns, dt_s, imu.rate_body_rad_s, *imu.force_body_m_s2, imu.temperature_c)
+        state = self._estimator.add_imu(packet)
+        for account in self._estimator.settled():
+            yield self._account(account, imu.stamp_ns)
+        if state is not None:
+            self._state = state
+            yield self._say(state)
+
+    def _correct(self, fix: StarFix, now_ns: int) -> Iterator[Message]:
+        covariance = np.array(fix.covariance).reshape(3, 3) + self._floor
+        if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
+            motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.omega_rad_s])
+            covariance += fix.stamp_sigma_s**2 * np.outer(motion, motion)
+        account = self._estimator.add_fix(
+            Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance)
+        )
+        yield self._account(account, now_ns)
+
+    def _account(self, account: Account, now_ns: int) -> FixAccount:
+        self._used += account.used
+        self._refused += not account.used
+        if account.used:
+            self._fix_stamp_ns = max(self._fix_stamp_ns, account.t_exposure_ns)
+        innovation = (
+            account.innovation_x_m,
+            account.innovation_y_m,
+            account.innovation_heading_rad,
+        )
+        age_s = (now_ns - account.t_exposure_ns) * 1e-9
+        return FixAccount(
+            account.t_exposure_ns, self.vehicle, account.used, account.reason, innovation, account.nis, age_s
+        )
+
+    def _say(self, state: PlanarState) -> VehicleState:
+        std = np.sqrt(np.diagonal(self._estimator.covariance())).tolist()
+        return VehicleState(
+            state.t_ns,
+            self.vehicle,
+            (state.x_m, state.y_m),
+            wrap_angle(state.heading_rad),
+            (state.vx_m_s, state.vy_m_s),
+            state.omega_rad_s,
+            tuple(std),
+            _status(state),
+            self._fix_stamp_ns,
+        )
+
+    def _hear_float(self, now_ns: int, *, floating: bool) -> None:
+        if not floating and self._rest_since_ns is None:
+            self._rest_since_ns = now_ns
+            self._estimator.begin_rest(now_ns)
+        elif floating and self._rest_since_ns is not None:
+            self._rest_ns += now_ns - self._rest_since_ns
+            self._rest_since_ns = None
+            self._estimator.end_rest(now_ns)
+
+    def _rest_s(self, now_ns: int) -> float:
+        going_on = 0 if self._rest_since_ns is None else now_ns - self._rest_since_ns
+        return (self._rest_ns + going_on) * 1e-9
+
+
+def _status(state: PlanarState | None) -> str:
+    if state is None:
+        return "starting"
+    return "lost" if state.is_lost else "flying"

@@ -1,0 +1,101 @@
+"""Guard: the shell around the one gate before the valves (``drivers.valve_bus.guard``)."""
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from drivers.valve_bus.guard import Guard as Gate
+from drivers.valve_bus.guard_account import Verdict
+from drivers.valve_bus.messages import Arm, StopReason
+from drivers.valve_bus.messages import ValveCommand as Command
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import (
+    NO_STOP,
+    Ack,
+    Diagnostics,
+    Request,
+    ValveCommand,
+    ValveSelection,
+    VehicleMode,
+)
+from groundstation.nodes.actions import answer, is_for, refusal
+from groundstation.nodes.node import Node
+
+PERIOD_NS = 20_000_000
+DIAGNOSTICS_EVERY = 50
+
+
+class Guard(Node):
+    """Lets commands through while the vehicle is armed and the selection is fresh; closes otherwise."""
+
+    inputs = (ValveSelection, Request)
+    outputs = (ValveCommand, VehicleMode, Ack, Diagnostics)
+
+    def __init__(self, vehicle: str, gate: Gate) -> None:
+        super().__init__(vehicle, PERIOD_NS)
+        self._gate = gate
+        self._ticks = 0
+
+    def start(self, now_ns: int) -> Iterator[Message]:
+        yield self._mode(now_ns, "", "the guard starts disarmed")
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case ValveSelection():
+                command = Command(
+                    self._gate.vehicle, message.counter, message.pulse_id, tuple(message.on_time_ms)
+                )
+                if self._gate.update(now_ns, command) is Verdict.NEW_PULSE:
+                    yield self._output(now_ns)
+            case Request() if is_for(message, "guard"):
+                reason = refusal(message) or self._carry_out(message.action, now_ns)
+                yield answer(message, now_ns, reason)
+                if not reason:
+                    yield self._mode(now_ns, message.author, message.action)
+                    yield self._output(now_ns)
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        yield self._output(now_ns)
+        self._ticks += 1
+        if self._ticks % DIAGNOSTICS_EVERY == 0:
+            counters = self._gate.counters
+            names = tuple(field.name for field in fields(counters))
+            values = tuple(str(getattr(counters, name)) for name in names)
+            yield Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/guard", 0, "", names, values)
+
+    def stop(self, now_ns: int) -> Iterator[Message]:
+        self._gate.stop(now_ns, StopReason.SHUTDOWN)
+        yield self._output(now_ns)
+
+    def _carry_out(self, action: str, now_ns: int) -> str:
+        """Do what was asked; the reason if it cannot be done."""
+        match action:
+            case "arm":
+                if not self._gate.arm(now_ns):
+                    return "a stop is latched: release it first"
+            case "disarm":
+                self._gate.disarm(now_ns)
+            case "stop":
+                self._gate.stop(now_ns, StopReason.OPERATOR)
+            case "release":
+                self._gate.release_stop(now_ns)
+        return ""
+
+    def _mode(self, now_ns: int, author: str, reason: str) -> VehicleMode:
+        stopped = self._gate.stop_reason is not None
+        return VehicleMode(now_ns, self.vehicle, self._gate.is_armed, stopped, author, reason)
+
+    def _output(self, now_ns: int) -> ValveCommand:
+        output = self._gate.tick(now_ns)
+        arming = next((said for said in output.messages if isinstance(said, Arm)), None)
+        stop = self._gate.stop_reason
+        return ValveCommand(
+            now_ns,
+            self.vehicle,
+            output.command.counter,
+            output.command.pulse_id,
+            bytes(output.command.on_times_ms),
+            output.gate.value,
+            output.open_mask,
+            NO_STOP if stop is None else int(stop),
+            0 if arming is None else 1 + arming.is_armed,
+        )

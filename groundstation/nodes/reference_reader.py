@@ -1,0 +1,33 @@
+"""Reference reader: the stream of truth or motion capture in, poses out."""
+
+from collections.abc import Iterator
+
+from drivers.reference.protocol import PoseParser
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import ReferenceBytes, ReferenceState
+from groundstation.nodes.node import Node
+
+
+class ReferenceReader(Node):
+    """Parses the stream of one vehicle."""
+
+    inputs = (ReferenceBytes,)
+    outputs = (ReferenceState,)
+
+    def __init__(self, vehicle: str) -> None:
+        super().__init__(vehicle)
+        self._parser = PoseParser()
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        del now_ns
+        assert isinstance(message, ReferenceBytes)
+        for pose in self._parser.feed(message.data):
+            if pose.is_tracked:
+                yield ReferenceState(
+                    pose.measured_stamp_ns(message.stamp_ns),
+                    self.vehicle,
+                    pose.position_table_m,
+                    pose.heading_rad,
+                    pose.velocity_table_m_s,
+                    pose.rate_rad_s,
+                )

@@ -1,0 +1,19 @@
+"""What can go wrong around the nodes.
+
+GroundStationError
+    UsageError   something the user gave is wrong: one sentence, exit code 2
+        RigError     the rig file
+    DeviceGone   a device of the rig cannot be opened or went away
+"""
+
+
+class GroundStationError(Exception):
+    """Base of the errors of the ground station."""
+
+
+class UsageError(GroundStationError):
+    """What was asked for cannot be done as it was asked; the text is one sentence for people."""
+
+
+class RigError(UsageError):
+    """The rig file is wrong."""

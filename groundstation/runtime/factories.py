@@ -1,0 +1,151 @@
+"""How each node is made from the rig: the one place that reads rig sections into configurations."""
+
+import math
+
+from drivers.valve_bus.guard import Guard as Gate
+from drivers.valve_bus.valve_budget import OpenTimeLimits
+from groundstation.control.allocation import Allocator
+from groundstation.control.brake import BrakeConfig
+from groundstation.control.keep_in import KeepIn, rectangle
+from groundstation.control.modulation import PulseConfig, PulseModulator
+from groundstation.control.mux import MuxConfig
+from groundstation.control.registry import make_controller
+from groundstation.control.state import Goal
+from groundstation.control.vehicle import VehicleModel, square_of_eight
+from groundstation.fusion.registry import ESTIMATORS
+from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
+from groundstation.nodes.allocation import Allocation
+from groundstation.nodes.command_mux import CommandMux
+from groundstation.nodes.controller import Controller
+from groundstation.nodes.fix_reader import FixReader
+from groundstation.nodes.fusion import Fusion
+from groundstation.nodes.guard import Guard
+from groundstation.nodes.imu_reader import ImuReader
+from groundstation.nodes.node import Node
+from groundstation.nodes.reference_reader import ReferenceReader
+from groundstation.nodes.start_sequence import StartSequence
+from groundstation.nodes.valve_writer import ValveWriter
+from groundstation.runtime.rig import MockUpSection, Rig
+
+MOCK_UP_RADIUS_M = 0.2  # keep-in margin: goals keep the whole mock-up on the table
+
+
+def _model(mock_up: MockUpSection) -> VehicleModel:
+    valves = square_of_eight(mock_up.valves.arm_m, mock_up.valves.thrust_n)
+    return VehicleModel(mock_up.mass_kg, mock_up.inertia_kg_m2, valves)
+
+
+def _modulator(mock_up: MockUpSection) -> PulseModulator:
+    valves = mock_up.valves
+    config = PulseConfig(
+        period_s=valves.period_s,
+        min_on_s=valves.min_on_s,
+        open_delay_s=valves.open_delay_s,
+        close_delay_s=valves.close_delay_s,
+    )
+    return PulseModulator(Allocator(_model(mock_up)), config)
+
+
+def _keep_in(rig: Rig) -> KeepIn:
+    table = rig.table
+    size = (table.x_max_m - table.x_min_m, table.y_max_m - table.y_min_m)
+    centre = ((table.x_max_m + table.x_min_m) / 2, (table.y_max_m + table.y_min_m) / 2)
+    return rectangle(size, margin_m=MOCK_UP_RADIUS_M, centre_table_m=centre)
+
+
+def command_mux(rig: Rig, vehicle: str) -> Node:
+    """The multiplexer of a vehicle, with a modulator of its own for braking."""
+    mock_up = rig.mock_up_of(vehicle)
+    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), _model(mock_up), _modulator(mock_up))
+
+
+def guard(rig: Rig, vehicle: str) -> Node:
+    """The guard of a vehicle's valves."""
+    limits = OpenTimeLimits(max_open_s=rig.mock_up_of(vehicle).valves.max_open_s)
+    return Guard(vehicle, Gate(rig.vehicles[vehicle].bus_index, limits))
+
+
+def valve_writer(rig: Rig, vehicle: str) -> Node:
+    """The speaker on the valve bus."""
+    return ValveWriter(vehicle, rig.vehicles[vehicle].bus_index)
+
+
+def imu_reader(rig: Rig, vehicle: str) -> Node:
+    """Parser, clock and scales of the IMU block."""
+    imu = rig.mock_up_of(vehicle).imu
+    return ImuReader(vehicle, imu.protocol, imu.baud, imu.ftdi_latency_s, imu.averaging)
+
+
+def fix_reader(rig: Rig, vehicle: str) -> Node:
+    """The reader of an external pose stream."""
+    camera = rig.mock_up_of(vehicle).star_camera
+    return FixReader(vehicle, camera.delay_sigma_s if camera is not None else 0.0)
+
+
+def spot_finder(rig: Rig, vehicle: str) -> Node:
+    """Detection of stars in frames."""
+    from groundstation.nodes.spot_finder import SpotFinder  # OpenCV loads only where it is used
+
+    del rig
+    return SpotFinder(vehicle)
+
+
+def star_tracker(rig: Rig, vehicle: str) -> Node:
+    """Identification and pose."""
+    from groundstation.nodes.star_tracker import StarTracker  # OpenCV loads only where it is used
+
+    camera = rig.mock_up_of(vehicle).star_camera
+    assert camera is not None
+    return StarTracker(vehicle, camera.camera, camera.ceiling, camera.delay_sigma_s)
+
+
+def fusion(rig: Rig, vehicle: str) -> Node:
+    """The rig's estimator with its noise model."""
+    mock_up = rig.mock_up_of(vehicle)
+    imu, camera = mock_up.imu, mock_up.star_camera
+    sigma_xy_m = camera.sigma_xy_m if camera is not None else 0.001
+    sigma_heading_rad = camera.sigma_heading_rad if camera is not None else math.radians(0.05)
+    noise = NoiseModel(
+        packet_period_s=1.0 / imu.frame_rate_hz,
+        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
+        acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
+        star_sigma_xy_m=sigma_xy_m,
+        star_sigma_heading_rad=sigma_heading_rad,
+        imu_offset_x_m=imu.position_body_m[0],
+        imu_offset_y_m=imu.position_body_m[1],
+        imu_offset_sigma_m=imu.position_sigma_m,
+        gyro_tempco_rad_s_c=imu.gyro_tempco_rad_s_k,
+        acc_tempco_m_s2_c=imu.acc_tempco_m_s2_k,
+        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
+        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
+    )
+    method = mock_up.fusion.method
+    external = rig.vehicles[vehicle].fixes is not None  # its covariance is the whole truth
+    floor = (0.0, 0.0) if external else (sigma_xy_m, sigma_heading_rad)
+    return Fusion(vehicle, ESTIMATORS[method](noise), method, floor)
+
+
+def controller(rig: Rig, vehicle: str) -> Node:
+    """The rig's controller, holding the vehicle's pose of the rig file."""
+    mock_up, hold = rig.mock_up_of(vehicle), rig.vehicles[vehicle].hold
+    section, keep_in = mock_up.control, _keep_in(rig)
+    law = make_controller(section.controller, section.parameters, _model(mock_up), keep_in)
+    goal = Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg))
+    neighbours = tuple(name for name in section.parameters.get("neighbours", {}) if name in rig.vehicles)
+    return Controller(vehicle, law, section.controller, goal, keep_in, neighbours, mock_up.valves.period_s)
+
+
+def allocation(rig: Rig, vehicle: str) -> Node:
+    """Allocation and pulse modulation."""
+    return Allocation(vehicle, _modulator(rig.mock_up_of(vehicle)))
+
+
+def start_sequence(rig: Rig, vehicle: str) -> Node:
+    """The start sequence of a vehicle."""
+    return StartSequence(vehicle, rig.mock_up_of(vehicle).fusion.rest_s)
+
+
+def reference_reader(rig: Rig, vehicle: str) -> Node:
+    """The reader of truth or motion capture."""
+    del rig
+    return ReferenceReader(vehicle)

@@ -1,0 +1,121 @@
+"""Figures of the report. Each takes the tracks and a path, and leaves a PNG."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from groundstation.runtime.tracks import Track, estimate_errors, station_errors
+
+VALVES = 8
+DPI = 120
+_COLOURS = ("#2a6fbb", "#c8553d", "#3c8d5a", "#8a5fbf", "#b8860b", "#4d4d4d")
+
+
+def draw_table(tracks: Mapping[str, Track], path: Path) -> None:
+    """Top view: truth as a trail, goal as a cross, the mock-up at the end with its heading."""
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    axes = figure.add_subplot()
+    for colour, (name, track) in zip(_cycle(), tracks.items(), strict=False):
+        path_xy = track.truth if len(track.truth) else track.state
+        axes.plot(path_xy[:, 1], path_xy[:, 2], color=colour, lw=1, alpha=0.8, label=name)
+        x, y, heading = path_xy[-1, 1:4]
+        half = 0.15
+        corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half], [-half, -half]])
+        turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
+        outline = corners @ turn.T + (x, y)
+        axes.plot(outline[:, 0], outline[:, 1], color=colour, lw=2)
+        axes.plot([x, x + 0.2 * math.cos(heading)], [y, y + 0.2 * math.sin(heading)], color=colour, lw=2)
+        if len(track.goal):
+            axes.plot(track.goal[-1, 1], track.goal[-1, 2], "+", color="black", ms=12)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    axes.set_title("On the table: path of the truth, goals (+), mock-ups at the end")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    figure.savefig(path, dpi=DPI)
+
+
+def draw_errors(tracks: Mapping[str, Track], path: Path) -> None:
+    """Off the goal, and estimate against truth with its three-sigma band, over time."""
+    figure = Figure(figsize=(10, 3 * 4), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True)
+    for colour, (name, track) in zip(_cycle(), tracks.items(), strict=False):
+        station, estimate = station_errors(track), estimate_errors(track)
+        panels[0].plot(station[:, 0], station[:, 1] * 1e3, color=colour, lw=0.8, label=name)
+        panels[1].plot(station[:, 0], np.degrees(station[:, 2]), color=colour, lw=0.8)
+        flown = estimate[estimate[:, 0] >= np.nan_to_num(track.flying_since_s)]
+        panels[2].plot(flown[:, 0], flown[:, 1] * 1e3, color=colour, lw=0.6)
+        band = track.state[track.state[:, 0] >= np.nan_to_num(track.flying_since_s)]
+        panels[2].plot(band[:, 0], 3e3 * band[:, 4], color=colour, lw=0.5, ls=":")
+        panels[2].plot(band[:, 0], -3e3 * band[:, 4], color=colour, lw=0.5, ls=":")
+        panels[3].plot(flown[:, 0], np.degrees(flown[:, 3]), color=colour, lw=0.6)
+        panels[3].plot(band[:, 0], 3 * np.degrees(band[:, 6]), color=colour, lw=0.5, ls=":")
+        panels[3].plot(band[:, 0], -3 * np.degrees(band[:, 6]), color=colour, lw=0.5, ls=":")
+    for axes, label in zip(
+        panels,
+        (
+            "off the goal, mm",
+            "heading off the goal, deg",
+            "estimate x - truth, mm",
+            "estimate heading - truth, deg",
+        ),
+        strict=True,
+    ):
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    panels[0].set_title("Station keeping against truth; estimates with their 3 sigma (dotted)")
+    panels[0].legend()
+    panels[-1].set_xlabel("t, s")
+    figure.savefig(path, dpi=DPI)
+
+
+def draw_valves(tracks: Mapping[str, Track], path: Path) -> None:
+    """When each valve was open, by the guard's word."""
+    figure = Figure(figsize=(10, 2.2 * max(1, len(tracks)) + 0.6), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(tracks), 1, sharex=True))
+    for axes, colour, (name, track) in zip(panels, _cycle(), tracks.items(), strict=False):
+        t, masks = track.open_masks[:, 0], track.open_masks[:, 1].astype(int)
+        for valve in range(VALVES):
+            moments = t[(masks >> valve) & 1 == 1]
+            axes.plot(moments, np.full(len(moments), valve), "|", color=colour, ms=7, mew=0.6)
+        axes.set_yticks(range(VALVES))
+        axes.set_ylim(-0.7, VALVES - 0.3)
+        axes.set_ylabel(f"{name}: valve")
+        axes.grid(alpha=0.3)
+    panels[0].set_title("Open valves")
+    panels[-1].set_xlabel("t, s")
+    figure.savefig(path, dpi=DPI)
+
+
+def draw_latency(tracks: Mapping[str, Track], path: Path) -> None:
+    """Age of the light at each stage of the chain, and of the bytes at the state."""
+    figure = Figure(figsize=(10, 3.5), layout="constrained")
+    axes = figure.add_subplot()
+    names = [name for name, track in tracks.items() if track.latency is not None]
+    stages: tuple[str, ...] = ()
+    width = 0.8 / max(1, len(names))
+    for index, (colour, name) in enumerate(zip(_cycle(), names, strict=False)):
+        latency = tracks[name].latency
+        assert latency is not None
+        stages = latency.stages
+        place = np.arange(len(stages)) + (index - (len(names) - 1) / 2) * width
+        low = np.nan_to_num(np.array(latency.p50_s)) * 1e3
+        high = np.nan_to_num(np.array(latency.p99_s)) * 1e3
+        axes.bar(place, low, width, color=colour, label=f"{name}, median")
+        axes.vlines(place, low, high, color="black", lw=1)
+        axes.plot(place, high, "_", color="black", ms=8)
+    axes.set_xticks(range(len(stages)), [stage.replace("_", " ") for stage in stages])
+    axes.set_ylabel("age, ms")
+    axes.set_title("Age of the light at each stage (line: 99th percentile); last: bytes arrived to state")
+    axes.grid(axis="y", alpha=0.3)
+    if names:
+        axes.legend()
+    figure.savefig(path, dpi=DPI)
+
+
+def _cycle() -> tuple[str, ...]:
+    return _COLOURS * 4

@@ -1,0 +1,308 @@
+"""The live runner: one process, one loop, one queue; wall clock and Zenoh.
+
+Threads only read devices or the bus and append to the queue; nodes run in the loop. What nodes of one
+process say to each other never leaves it before they have heard it, and goes out on the bus besides.
+"""
+
+import heapq
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.journal import JournalWriter, Kind
+from groundstation.bus.topics import TOPICS, Delivery, Recorded, Scope, topic_named, topic_of
+from groundstation.bus.zenoh_bus import ZenohBus, key_of, split_key
+from groundstation.messages.base import Message
+from groundstation.messages.cdr import CodecError
+from groundstation.messages.definitions import Diagnostics, Journal
+from groundstation.runtime.live_ports import PortThread
+from groundstation.runtime.ports import PortTranslation
+from groundstation.runtime.slot import Dispatch, NodeSlot, Sequences, owner_of
+
+JOURNAL_PERIOD_NS = 100_000_000
+LATCH_PERIOD_NS = 1_000_000_000
+
+
+class _Remote(NamedTuple):
+    key: str
+    payload: bytes
+    attachment: bytes
+
+
+class _FromPort(NamedTuple):
+    port: PortTranslation
+    stamp_ns: int
+    data: object
+
+
+class _Newest(NamedTuple):
+    key: str
+
+
+class LiveProcess:
+    """Runs the nodes and ports of one process until it is stopped.
+
+    Args:
+        process: Its name.
+        slots: Its nodes, in the order of the node table.
+        ports: Its edges with their addresses resolved.
+        bus: Session with the hub.
+        journal: Shared with the slots.
+        sequences: Shared with the slots.
+        publish_images: Whether camera frames go out on the bus (recorded losslessly).
+    """
+
+    def __init__(
+        self,
+        process: str,
+        slots: list[NodeSlot],
+        ports: Iterable[PortTranslation],
+        bus: ZenohBus,
+        journal: JournalWriter,
+        sequences: Sequences,
+        *,
+        publish_images: bool,
+    ) -> None:
+        self._process = process
+        self._slots = slots
+        self._bus = bus
+        self._journal = journal
+        self._sequences = sequences
+        self._publish_images = publish_images
+        self._dispatch = Dispatch(slots)
+        self._queue: queue.SimpleQueue[_Remote | _FromPort | _Newest | None] = queue.SimpleQueue()
+        self._newest: dict[str, _Remote | _FromPort] = {}
+        self._newest_lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._seen_latched: dict[str, int] = {}
+        self._latched: dict[str, tuple[Envelope, bytes]] = {}
+        self._local: deque[Delivered] = deque()
+        self._held: list[tuple[int, int, Delivered | NodeSlot]] = []
+        self._held_count = 0
+        self._waiting: dict[str, list[Delivered]] = {}
+        self.undecodable = 0
+        self._threads = [PortThread(port, self._from_port, self._port_trouble) for port in ports]
+        self._writers = {
+            (topic_of(kind).index, vehicle): thread
+            for thread in self._threads
+            for kind, vehicle in thread.port.writes()
+        }
+
+    def stop(self) -> None:
+        """Ask the loop to end; safe in a signal handler and from any thread."""
+        self._stopping.set()
+        self._queue.put(None)
+
+    def run(self) -> None:
+        """Run until ``stop``; nodes then have their last words and ports are closed."""
+        self._subscribe()
+        now_ns = time.monotonic_ns()
+        for slot in self._slots:
+            self._publish(slot.start(now_ns))
+        self._drain()
+        for thread in self._threads:
+            thread.start()
+        self._bus.announce(self._process)
+        ticks = [[now_ns + s.node.tick_period_ns, s] for s in self._slots if s.node.tick_period_ns]
+        next_journal_ns, next_latch_ns = now_ns + JOURNAL_PERIOD_NS, now_ns + LATCH_PERIOD_NS
+        while not self._stopping.is_set():
+            due_ns = min((tick[0] for tick in ticks), default=next_journal_ns)  # type: ignore[type-var]
+            due_ns = min(due_ns, next_journal_ns)  # type: ignore[type-var]
+            if self._held:
+                due_ns = min(due_ns, self._held[0][0])  # type: ignore[type-var]
+            self._take(due_ns)  # type: ignore[arg-type]
+            now_ns = time.monotonic_ns()
+            self._release(now_ns)
+            for tick in ticks:
+                slot = tick[1]
+                assert isinstance(slot, NodeSlot)
+                if tick[0] <= now_ns:  # type: ignore[operator]
+                    self._publish(slot.tick(now_ns))
+                    self._drain()
+                    period_ns = slot.node.tick_period_ns
+                    tick[0] = max(tick[0] + period_ns, now_ns + period_ns // 2)  # type: ignore[operator,type-var]
+            if now_ns >= next_journal_ns:
+                self._publish_journal(now_ns)
+                next_journal_ns = now_ns + JOURNAL_PERIOD_NS
+            if now_ns >= next_latch_ns:
+                for envelope, encoded in self._latched.values():
+                    self._bus.publish(envelope, encoded)
+                next_latch_ns = now_ns + LATCH_PERIOD_NS
+        self._end()
+
+    # -- in ---------------------------------------------------------------------------------------
+
+    def _subscribe(self) -> None:
+        made_here = {
+            (topic_of(kind).index, slot.node.vehicle)
+            for slot in self._slots
+            for kind in slot.node.outputs
+            if topic_of(kind).scope is Scope.VEHICLE
+        }
+        keys = set()
+        for index, vehicle in self._dispatch.topics():
+            topic = TOPICS[index]
+            if topic.scope is Scope.PROCESS:
+                keys.add(f"*/{topic.noun}")
+            elif (index, vehicle) not in made_here:
+                keys.add(key_of(topic, vehicle))
+        for key in sorted(keys):
+            self._bus.subscribe(key, self._from_bus)
+
+    def _from_bus(self, key: str, payload: bytes, attachment: bytes) -> None:
+        self._enqueue(key, _Remote(key, payload, attachment), topic_named(split_key(key)[1]).delivery)
+
+    def _from_port(self, port: PortTranslation, stamp_ns: int, data: object) -> None:
+        self._enqueue(port.channel, _FromPort(port, stamp_ns, data), port.delivery)
+
+    def _enqueue(self, key: str, item: _Remote | _FromPort, delivery: Delivery) -> None:
+        if delivery is Delivery.EVERY:
+            self._queue.put(item)
+            return
+        with self._newest_lock:
+            waiting = key in self._newest
+            self._newest[key] = item
+        if not waiting:
+            self._queue.put(_Newest(key))
+
+    def _take(self, due_ns: int) -> None:
+        """Handle what is in the queue, waiting for it until ``due_ns`` at the longest."""
+        timeout_s = (due_ns - time.monotonic_ns()) * 1e-9
+        try:
+            item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
+        except queue.Empty:
+            return
+        if isinstance(item, _Newest):
+            with self._newest_lock:
+                item = self._newest.pop(item.key)
+        if isinstance(item, _Remote):
+            self._remote(item)
+        elif isinstance(item, _FromPort):
+            self._publish_from_port(item.port.to_message(item.stamp_ns, item.data))
+        self._drain()
+
+    def _remote(self, item: _Remote) -> None:
+        owner, noun = split_key(item.key)
+        topic = topic_named(noun)
+        if owner == self._process:
+            return  # a session hears its own puts
+        try:
+            envelope = Envelope.unpack(topic, owner, item.attachment)
+            payload = topic.codec.decode(item.payload)
+        except (CodecError, ValueError):
+            self.undecodable += 1
+            return
+        if topic.latched:
+            key = f"{item.key} {payload.vehicle}"
+            if self._seen_latched.get(key) == envelope.sequence:
+                return
+            self._seen_latched[key] = envelope.sequence
+        self._local.append(Delivered(envelope, payload))
+
+    # -- out --------------------------------------------------------------------------------------
+
+    def _publish(self, messages: Iterable[Delivered]) -> None:
+        """Put on the bus and before the local nodes, now or when the rig's emulated latency has passed."""
+        now_ns = time.monotonic_ns()
+        for delivered in messages:
+            if delivered.envelope.publish_ns > now_ns:
+                self._hold(delivered.envelope.publish_ns, delivered)
+            else:
+                self._send(delivered)
+
+    def _send(self, delivered: Delivered) -> None:
+        envelope, payload = delivered
+        topic = envelope.topic
+        if topic.recorded is Recorded.ALWAYS or self._publish_images:
+            encoded = topic.codec.encode(payload)
+            self._bus.publish(envelope, encoded)
+            if topic.latched:
+                self._latched[f"{envelope.vehicle}/{topic.noun}"] = (envelope, encoded)
+        writer = self._writers.get((topic.index, payload.vehicle))
+        if writer is not None:
+            writer.write(payload)
+        self._local.append(delivered)
+
+    def _publish_from_port(self, payload: Message) -> None:
+        topic = topic_of(type(payload))
+        owner = owner_of(topic, payload, self._process)
+        sequence = self._sequences.next(topic, owner)
+        now_ns = time.monotonic_ns()
+        self._journal.note(Kind.PORT, None, topic.index, owner, sequence, now_ns)
+        self._send(Delivered(Envelope(topic, owner, sequence, now_ns), payload))
+
+    def _drain(self) -> None:
+        """Deliver until no local node has anything to hear."""
+        local = self._local
+        while local:
+            delivered = local.popleft()
+            for slot in self._dispatch.hearers(delivered.envelope.topic, delivered.payload):
+                now_ns = time.monotonic_ns()
+                if slot.timing.busy_ns and slot.busy_until_ns > now_ns:
+                    self._wait(slot, delivered, now_ns)
+                else:
+                    self._hand_over(slot, delivered, now_ns)
+
+    def _hand_over(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
+        said = slot.receive(delivered, now_ns)
+        if slot.timing.busy_ns:
+            slot.busy_until_ns = now_ns + slot.timing.busy_ns
+            self._hold(slot.busy_until_ns, slot)
+        self._publish(said)
+
+    def _wait(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
+        waiting = self._waiting.setdefault(slot.key, [])
+        if waiting and delivered.envelope.topic.delivery is Delivery.NEWEST:
+            slot.drop(waiting.pop(), now_ns)
+        waiting.append(delivered)
+
+    def _hold(self, stamp_ns: int, what: Delivered | NodeSlot) -> None:
+        self._held_count += 1
+        heapq.heappush(self._held, (stamp_ns, self._held_count, what))
+
+    def _release(self, now_ns: int) -> None:
+        while self._held and self._held[0][0] <= now_ns:
+            _, _, what = heapq.heappop(self._held)
+            if isinstance(what, Delivered):
+                self._send(what)
+            else:
+                waiting = self._waiting.get(what.key)
+                if waiting:
+                    self._hand_over(what, waiting.pop(0), now_ns)
+            self._drain()
+
+    def _port_trouble(self, channel: str, level: int, summary: str) -> None:
+        """Called by port threads: a device opened, went away, or cannot be opened."""
+        self._queue.put(_FromPort(_TroublePort(channel), time.monotonic_ns(), (level, summary)))
+
+    def _publish_journal(self, now_ns: int) -> None:
+        """An empty journal is said too: it is the process's sign of life."""
+        names, entries = self._journal.take()
+        topic = topic_of(Journal)
+        payload = Journal(now_ns, "", self._process, names, entries)
+        envelope = Envelope(topic, self._process, self._sequences.next(topic, self._process), now_ns)
+        self._bus.publish(envelope, topic.codec.encode(payload))
+
+    def _end(self) -> None:
+        for slot in self._slots:
+            self._publish(slot.stop(time.monotonic_ns()))
+            self._drain()
+        for thread in self._threads:
+            thread.close()
+        self._publish_journal(time.monotonic_ns())
+
+
+class _TroublePort(PortTranslation):
+    """Turns what a port thread has to say about its device into a ``Diagnostics`` message."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel, channel.rpartition("/")[0], None, "")
+
+    def to_message(self, stamp_ns: int, data: object) -> Message:
+        assert isinstance(data, tuple)
+        level, summary = data
+        return Diagnostics(stamp_ns, self.vehicle, self.channel, level, summary, (), ())

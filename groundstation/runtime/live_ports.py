@@ -1,0 +1,165 @@
+"""Opens the real edges: one reader thread per port, which retries with back-off and says so.
+
+``OPENERS`` maps a translation to the driver that serves it; a new kind of port is one row more.
+"""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from typing import cast
+
+from drivers.errors import DeviceError
+from drivers.imu_block.port import SerialPort
+from drivers.laboratory import CanFrame
+from drivers.star_camera.port import StarCamera
+from drivers.valve_bus.port import ValveBusPort as ValveBusDriver
+from groundstation.messages.base import Message
+from groundstation.runtime.ports import (
+    FixStreamPort,
+    ImuPort,
+    PortTranslation,
+    ReferencePort,
+    StarCameraPort,
+    ValveBusPort,
+)
+
+READ_TIMEOUT_S = 0.2
+FIRST_RETRY_S = 0.2
+LAST_RETRY_S = 5.0
+OK, WARNING, ERROR = 0, 1, 2
+
+FromPort = Callable[[PortTranslation, int, object], None]
+Trouble = Callable[[str, int, str], None]
+
+
+class Edge(ABC):
+    """An open device."""
+
+    @abstractmethod
+    def read(self) -> Iterable[tuple[int, object]]:
+        """What arrived, as (stamp_ns, data); empty after a while of silence. Raises DeviceError."""
+
+    def write(self, data: bytes | CanFrame) -> None:
+        """Send something out. Raises DeviceError."""
+        raise TypeError(f"{type(self).__name__} is read-only, cannot send {data!r}")
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the device; may be called twice."""
+
+
+class _ByteEdge(Edge):
+    def __init__(self, url: str, baud: int) -> None:
+        self._port = SerialPort(url, baud)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        stamp_ns, data = self._port.read_chunk(READ_TIMEOUT_S)
+        return ((stamp_ns, data),) if data else ()
+
+    def write(self, data: bytes | CanFrame) -> None:
+        assert isinstance(data, bytes)
+        self._port.write(data)
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class _CameraEdge(Edge):
+    def __init__(self, source: str, timeout_s: float) -> None:
+        address = int(source) if source.isdigit() else source  # a device index
+        self._camera = StarCamera.open(address, silence_s=timeout_s)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        frame = self._camera.read(READ_TIMEOUT_S)
+        return () if frame is None else ((frame.stamp_arrival_ns, frame),)
+
+    def close(self) -> None:
+        self._camera.close()
+
+
+class _CanEdge(Edge):
+    def __init__(self, config: Mapping[str, object]) -> None:
+        self._bus = ValveBusDriver(config)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        found = self._bus.read(READ_TIMEOUT_S)
+        return () if found is None else (found,)
+
+    def write(self, data: bytes | CanFrame) -> None:
+        assert isinstance(data, CanFrame)
+        self._bus.send(data)
+
+    def close(self) -> None:
+        self._bus.close()
+
+
+STREAM_BAUD = 115200  # of pose streams; sockets ignore it
+
+OPENERS: dict[type[PortTranslation], Callable[[PortTranslation], Edge]] = {
+    ImuPort: lambda port: _ByteEdge(str(port.address), cast("ImuPort", port).baud),
+    FixStreamPort: lambda port: _ByteEdge(str(port.address), STREAM_BAUD),
+    ReferencePort: lambda port: _ByteEdge(str(port.address), STREAM_BAUD),
+    StarCameraPort: lambda port: _CameraEdge(str(port.address), cast("StarCameraPort", port).timeout_s),
+    ValveBusPort: lambda port: _CanEdge(cast("Mapping[str, object]", port.address)),
+}
+
+
+class PortThread(threading.Thread):
+    """Keeps one port open and reads it.
+
+    Args:
+        port: The translation, with its address resolved.
+        deliver: Called with what arrived, on this thread.
+        trouble: Called with (channel, level, sentence) when the device opens, or cannot, or goes away.
+    """
+
+    def __init__(self, port: PortTranslation, deliver: FromPort, trouble: Trouble) -> None:
+        super().__init__(name=f"port {port.channel}", daemon=True)
+        self.port = port
+        self._deliver = deliver
+        self._trouble = trouble
+        self._closing = threading.Event()
+        self._edge: Edge | None = None
+
+    def run(self) -> None:
+        """Read until closed."""
+        wait_s = FIRST_RETRY_S
+        while not self._closing.is_set():
+            try:
+                edge = OPENERS[type(self.port)](self.port)
+                self._edge = edge
+                self._trouble(self.port.channel, OK, f"{self.port.channel}: open at {self.port.address}")
+                while not self._closing.is_set():
+                    for stamp_ns, data in edge.read():
+                        self._deliver(self.port, stamp_ns, data)
+                        wait_s = FIRST_RETRY_S
+            except DeviceError as error:
+                if not self._closing.is_set():
+                    sentence = f"{self.port.channel}: {error}; next try in {wait_s:.1f} s"
+                    self._trouble(self.port.channel, ERROR, sentence)
+            finally:
+                self._release()
+            self._closing.wait(wait_s)
+            wait_s = min(2 * wait_s, LAST_RETRY_S)
+
+    def write(self, payload: Message) -> None:
+        """Send a message out; where the device is gone it is lost and said so."""
+        edge = self._edge
+        if edge is None:
+            return
+        try:
+            edge.write(self.port.to_device(payload))
+        except DeviceError as error:
+            self._trouble(self.port.channel, WARNING, f"{self.port.channel}: {error}")
+
+    def close(self) -> None:
+        """End the thread and release the device."""
+        self._closing.set()
+        if self.is_alive():
+            self.join(timeout=1.0)
+        self._release()
+
+    def _release(self) -> None:
+        edge, self._edge = self._edge, None
+        if edge is not None:
+            edge.close()

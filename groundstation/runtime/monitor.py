@@ -1,0 +1,159 @@
+"""What a person wants to know of a running rig: newest values, rates, errors against truth, counters.
+
+The monitor takes every message, live or in lockstep, and makes the latency ledger's summaries. It
+publishes nothing and decides nothing.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from groundstation.bus.envelope import Delivered
+from groundstation.frames import wrap_angle
+from groundstation.messages import definitions as m
+from groundstation.messages.base import Message
+from groundstation.runtime import ledger
+
+ERROR_WINDOW_S = 30.0
+RATE_WINDOW_S = 3.0
+LINES_KEPT = 8
+
+
+@dataclass(slots=True)
+class Rate:
+    """Messages per second of one topic over the last seconds."""
+
+    _stamps: deque[int] = field(default_factory=deque)
+
+    def count(self, now_ns: int) -> None:
+        """One more."""
+        self._stamps.append(now_ns)
+        while now_ns - self._stamps[0] > RATE_WINDOW_S * 1e9:
+            self._stamps.popleft()
+
+    def hz(self, now_ns: int) -> float:
+        """The rate; 0 when silent."""
+        while self._stamps and now_ns - self._stamps[0] > RATE_WINDOW_S * 1e9:
+            self._stamps.popleft()
+        return len(self._stamps) / RATE_WINDOW_S
+
+
+@dataclass(slots=True)
+class Errors:
+    """Distances of the last seconds between two poses: (stamp, position in m, heading in rad)."""
+
+    _samples: deque[tuple[int, float, float]] = field(default_factory=deque)
+
+    def add(self, now_ns: int, position_m: float, heading_rad: float) -> None:
+        """Take one comparison."""
+        self._samples.append((now_ns, position_m, heading_rad))
+        while now_ns - self._samples[0][0] > ERROR_WINDOW_S * 1e9:
+            self._samples.popleft()
+
+    def rms(self) -> tuple[float, float]:
+        """RMS of position (m) and heading (rad) over the window; NaN when empty."""
+        count = len(self._samples)
+        if not count:
+            return math.nan, math.nan
+        position = math.sqrt(sum(p * p for _, p, _ in self._samples) / count)
+        heading = math.sqrt(sum(h * h for _, _, h in self._samples) / count)
+        return position, heading
+
+
+@dataclass(slots=True)
+class VehicleMonitor:
+    """Everything known about one vehicle."""
+
+    newest: dict[type[Message], Message] = field(default_factory=dict)
+    rates: dict[type[Message], Rate] = field(default_factory=dict)
+    estimate_errors: Errors = field(default_factory=Errors)
+    """Estimate against truth."""
+    station_errors: Errors = field(default_factory=Errors)
+    """Truth against goal."""
+    refused: dict[str, int] = field(default_factory=dict)
+    """Fixes refused, by reason."""
+
+    def rate_hz(self, payload: type[Message], now_ns: int) -> float:
+        """Messages per second of a topic."""
+        rate = self.rates.get(payload)
+        return rate.hz(now_ns) if rate is not None else 0.0
+
+
+_RATED: tuple[type[Message], ...] = (m.Imu, m.StarFix, m.VehicleState, m.ValveCommand)
+
+
+class Monitor:
+    """Takes messages, answers questions."""
+
+    def __init__(self, vehicles: tuple[str, ...]) -> None:
+        self.vehicles = {name: VehicleMonitor() for name in vehicles}
+        self.ledger = ledger.Ledger()
+        self.ports: dict[str, m.Diagnostics] = {}
+        self.nodes: dict[str, m.Diagnostics] = {}
+        self.lines: deque[str] = deque(maxlen=LINES_KEPT)
+        self._unread: list[str] = []
+
+    def take(self, delivered: Delivered, now_ns: int) -> None:
+        """Account for one message."""
+        payload = delivered.payload
+        if isinstance(payload, m.Diagnostics):
+            self._diagnostics(payload)
+            return
+        vehicle = self.vehicles.get(payload.vehicle)
+        if vehicle is None:
+            return
+        kind = type(payload)
+        if kind in ledger.HEARD:
+            self.ledger.take(delivered)
+        vehicle.newest[kind] = payload
+        if kind in _RATED:
+            vehicle.rates.setdefault(kind, Rate()).count(now_ns)
+        if isinstance(payload, m.ReferenceState):
+            self._compare(vehicle, payload, now_ns)
+        elif isinstance(payload, m.StarFix) and not payload.fix:
+            vehicle.refused[payload.reason] = vehicle.refused.get(payload.reason, 0) + 1
+        elif isinstance(payload, m.SequencePhase):
+            self.say(
+                f"{payload.vehicle}: {payload.phase}" + (f" ({payload.detail})" if payload.detail else "")
+            )
+        elif isinstance(payload, m.Ack) and not payload.accepted:
+            self.say(f"{payload.vehicle}: {payload.action} refused: {payload.reason}")
+
+    def say(self, line: str) -> None:
+        """Keep a line for people; the newest few are shown."""
+        self.lines.append(line)
+        self._unread.append(line)
+
+    def take_lines(self) -> list[str]:
+        """Lines since the last call, for a log."""
+        lines, self._unread = self._unread, []
+        return lines
+
+    def _diagnostics(self, payload: m.Diagnostics) -> None:
+        is_port = "/" in payload.node and not payload.keys
+        known = self.ports if is_port else self.nodes
+        before = known.get(payload.node)
+        known[payload.node] = payload
+        if payload.summary and (before is None or before.summary != payload.summary):
+            self.say(payload.summary)
+
+    @staticmethod
+    def _compare(vehicle: VehicleMonitor, truth: m.ReferenceState, now_ns: int) -> None:
+        state = vehicle.newest.get(m.VehicleState)
+        if isinstance(state, m.VehicleState) and state.status == "flying":
+            age_s = (truth.stamp_ns - state.stamp_ns) * 1e-9
+            dx = state.position_table_m[0] + state.velocity_table_m_s[0] * age_s - truth.position_table_m[0]
+            dy = state.position_table_m[1] + state.velocity_table_m_s[1] * age_s - truth.position_table_m[1]
+            turn = wrap_angle(state.heading_rad + state.rate_rad_s * age_s - truth.heading_rad)
+            vehicle.estimate_errors.add(now_ns, math.hypot(dx, dy), turn)
+        goal = vehicle.newest.get(m.ControlStatus)
+        phase = vehicle.newest.get(m.SequencePhase)
+        if (
+            isinstance(goal, m.ControlStatus)
+            and isinstance(phase, m.SequencePhase)
+            and phase.phase == "flying"
+        ):
+            dx = goal.goal_position_table_m[0] - truth.position_table_m[0]
+            dy = goal.goal_position_table_m[1] - truth.position_table_m[1]
+            turn = wrap_angle(goal.goal_heading_rad - truth.heading_rad)
+            vehicle.station_errors.add(now_ns, math.hypot(dx, dy), turn)

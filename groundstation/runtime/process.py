@@ -1,0 +1,88 @@
+"""One child process of the launcher: ``python -m groundstation.runtime.process``.
+
+Its orders are one JSON line on stdin. Stdin then stays open for as long as the launcher lives: its end
+means that nobody watches any more, and the process stops in good order, valves first.
+"""
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.bus.journal import JournalWriter
+from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.runtime.live import LiveProcess
+from groundstation.runtime.node_table import build_slots
+from groundstation.runtime.plan import resolved_ports
+from groundstation.runtime.rig import load_rig
+from groundstation.runtime.slot import Sequences
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What a child is told.
+
+    Attributes:
+        process: Its name in the plan.
+        rig: Path of the rig file.
+        endpoint: Of the hub.
+        addresses: Of the laboratory's channels, as announced.
+        recording: Path of the recording; used by the recorder.
+        utc_offset_ns: UTC minus monotonic clock; used by the recorder.
+    """
+
+    process: str
+    rig: str
+    endpoint: str
+    addresses: dict[str, Any]
+    recording: str | None = None
+    utc_offset_ns: int = 0
+
+    def line(self) -> bytes:
+        """As it is written to the child's stdin."""
+        return json.dumps(asdict(self)).encode() + b"\n"
+
+
+def read_orders() -> Orders:
+    """Read the orders from stdin."""
+    return Orders(**json.loads(sys.stdin.buffer.readline()))
+
+
+def stop_when_asked(stop: Callable[[], None]) -> None:
+    """Call ``stop`` on SIGTERM and when the launcher is gone; Ctrl-C is the launcher's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: stop())
+
+    def watch() -> None:
+        sys.stdin.buffer.read()
+        stop()
+
+    threading.Thread(target=watch, name="launcher watch", daemon=True).start()
+
+
+def run(orders: Orders) -> None:
+    """Build the nodes of the process and run them until told to stop."""
+    rig = load_rig(Path(orders.rig))
+    journal, sequences = JournalWriter(), Sequences()
+    slots = build_slots(rig, orders.process, journal, sequences)
+    ports = [port for port in resolved_ports(rig, orders.addresses) if port.process == orders.process]
+    with ZenohBus(orders.endpoint) as bus:
+        process = LiveProcess(
+            orders.process,
+            slots,
+            ports,
+            bus,
+            journal,
+            sequences,
+            publish_images=rig.record.images == "lossless",
+        )
+        stop_when_asked(process.stop)
+        process.run()
+
+
+if __name__ == "__main__":
+    run(read_orders())

@@ -1,0 +1,182 @@
+"""The replay runner: the recording's stamps are the clock, its journal is the order of things.
+
+Each chosen node is built anew and told exactly what it was told then: started, handed the recorded
+inputs at the recorded moments, ticked, stopped. What it says is compared with what was recorded. One
+pass over the file in log order; memory holds what lies between a message and its journal entry.
+"""
+
+from collections import deque
+from collections.abc import Callable, Collection
+
+from groundstation.bus.journal import NO_NODE, Kind, read_entries
+from groundstation.bus.topics import TOPICS, Topic, topic_of
+from groundstation.messages.definitions import Journal
+from groundstation.nodes.node import Node
+from groundstation.recording.policy import is_kept
+from groundstation.recording.reader import Recording
+from groundstation.recording.writer import Recorder
+from groundstation.runtime.errors import UsageError
+from groundstation.runtime.replay_comparison import EXACT, Comparison, Tolerances
+from groundstation.runtime.replay_node import NodeFactory, ReplayedNode
+from groundstation.runtime.replay_report import ReplayReport
+
+LOOK_AHEAD_NS = 2_000_000_000  # a recorder may log a message later than the process that consumed it
+
+
+def recorded_nodes(recording: Recording) -> tuple[str, ...]:
+    """Keys of all nodes whose start is in the journal, sorted."""
+    found: set[str] = set()
+    for message in recording.messages([topic_of(Journal)]):
+        journal = message.payload
+        assert isinstance(journal, Journal)
+        entries = read_entries(journal.entries)
+        starts = entries["node"][entries["kind"] == Kind.START]
+        found.update(journal.names[index] for index in starts.tolist())
+    return tuple(sorted(found))
+
+
+class ReplayRunner:
+    """Replays nodes of one recording.
+
+    Args:
+        recording: Open recording.
+        factory: Makes a node of its key; called once per start in the journal.
+        nodes: Keys of the nodes to replay; None for every node whose inputs were recorded.
+        tolerances: What may differ; nothing by default.
+        output: Takes what the nodes say now; messages said only now carry sequence 0.
+
+    Raises:
+        UsageError: A node asked for is not in the journal, or its inputs were not recorded.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        factory: NodeFactory,
+        nodes: Collection[str] | None = None,
+        tolerances: Tolerances = EXACT,
+        output: Recorder | None = None,
+    ) -> None:
+        self._factory = factory
+        self._policy = recording.info.images
+        present = recorded_nodes(recording)
+        prepared: dict[str, Node] = {}
+        refused: dict[str, str] = {}
+        for key in present if nodes is None else dict.fromkeys(nodes):
+            if key not in present:
+                known = ", ".join(present) or "none"
+                raise UsageError(f"{recording.path}: no node {key!r} is in the journal (there: {known})")
+            node = factory(key)
+            reason = self._why_not(key, node)
+            if reason is None:
+                prepared[key] = node
+            elif nodes is None:
+                refused[key] = reason
+            else:
+                raise UsageError(f"{recording.path}: {reason}")
+        self._replayed_nodes = {key: ReplayedNode(key, node) for key, node in prepared.items()}
+        self._report = ReplayReport(tuple(prepared), refused)
+        self._comparison = Comparison(tolerances, output)
+        self._backlog: deque[Journal] = deque()
+        heard = {topic_of(kind) for node in prepared.values() for kind in node.inputs}
+        said = {topic_of(kind) for node in prepared.values() for kind in node.outputs}
+        self._said = {topic.index for topic in said}
+        self._stream = recording.messages(heard | said | {topic_of(Journal)})
+        self._log_ns = 0
+
+    def run(self, progress: Callable[[int], None] | None = None) -> ReplayReport:
+        """Replay the whole recording; call it once.
+
+        Args:
+            progress: Told the log time now and then.
+        """
+        told_ns = 0
+        while self._pull():
+            while self._backlog:
+                self._follow(self._backlog.popleft())
+            if progress is not None and self._log_ns >= told_ns:
+                progress(self._log_ns)
+                told_ns = self._log_ns + 1_000_000_000
+        for node in self._replayed_nodes.values():
+            self._leave(node)
+        self._report.results = self._comparison.finish()
+        return self._report
+
+    def _why_not(self, key: str, node: Node) -> str | None:
+        for kind in node.inputs:
+            topic = topic_of(kind)
+            if not is_kept(topic, self._policy):
+                return (
+                    f"{key} cannot be replayed: it hears {topic.noun}, which this recording "
+                    f"does not keep (images = {self._policy.value!r})"
+                )
+        return None
+
+    def _pull(self) -> bool:
+        """Read one more message of the file and put it where it will be looked for."""
+        message = next(self._stream, None)
+        if message is None:
+            return False
+        self._log_ns = message.log_ns
+        topic = message.envelope.topic
+        if topic.payload is Journal:
+            journal = message.payload
+            assert isinstance(journal, Journal)
+            self._backlog.append(journal)
+        for node in self._replayed_nodes.values():
+            node.hear(message)
+        if topic.index in self._said:
+            self._comparison.recorded(message)
+        return True
+
+    def _follow(self, journal: Journal) -> None:
+        names = journal.names
+        for entry in read_entries(journal.entries).tolist():
+            now_ns, sequence, kind, topic_index, node_index, owner_index = entry[:6]
+            if node_index == NO_NODE:
+                continue
+            node = self._replayed_nodes.get(names[node_index])
+            if node is None or kind == Kind.DROP:
+                continue
+            if kind == Kind.OUTPUT:
+                self._expect(node, TOPICS[topic_index], names[owner_index], sequence)
+                continue
+            self._leave(node)
+            if kind == Kind.START:
+                self._report.config_crcs[node.key] = sequence
+                node.begin(self._factory, journal.process)
+                node.take(node.node.start(now_ns), now_ns)
+            elif not node.is_started:
+                raise UsageError(
+                    f"{node.key} cannot be replayed: the recording begins after the node had started"
+                )
+            elif kind == Kind.INPUT:
+                self._hand_over(node, topic_index, names[owner_index], sequence, now_ns)
+            elif kind == Kind.TICK:
+                self._report.ticks += 1
+                node.take(node.node.tick(now_ns), now_ns)
+            elif kind == Kind.STOP:
+                node.take(node.node.stop(now_ns), now_ns)
+
+    def _hand_over(self, node: ReplayedNode, index: int, owner: str, sequence: int, now_ns: int) -> None:
+        while (found := node.find(index, owner, sequence)) is None:
+            if self._log_ns > now_ns + LOOK_AHEAD_NS or not self._pull():
+                name = f"{node.key} <- {TOPICS[index].noun}"
+                self._report.missing_inputs[name] = self._report.missing_inputs.get(name, 0) + 1
+                return
+        self._report.inputs += 1
+        node.take(node.node.receive(found.payload, now_ns), now_ns)
+
+    def _expect(self, node: ReplayedNode, topic: Topic, owner: str, sequence: int) -> None:
+        """The journal says that the node said this next."""
+        if node.said:
+            payload, said_ns = node.said.popleft()
+            self._comparison.replayed(topic, owner, sequence, payload, said_ns)
+        else:
+            self._comparison.missing(topic, owner)
+
+    def _leave(self, node: ReplayedNode) -> None:
+        """The node goes on to its next call: whatever of the last is not in the journal is new."""
+        while node.said:
+            payload, said_ns = node.said.popleft()
+            self._comparison.extra(node.owner_of(payload), payload, said_ns)

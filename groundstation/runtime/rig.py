@@ -1,0 +1,270 @@
+"""The rig file: one TOML that says what stands in the laboratory and how it is wired.
+
+Unknown keys are refused. Lengths are metres, angles in rig files are degrees (``_deg``). Relative
+paths are relative to the rig file. Addresses beginning with ``laboratory:`` are resolved by what the
+emulated laboratory announces; all others are opened as they stand.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from groundstation.control.registry import CONTROLLERS
+from groundstation.fusion.registry import ESTIMATORS
+from groundstation.runtime.errors import RigError
+
+LABORATORY = "laboratory:"
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TableSection(_Section):
+    """The table: its edges in table coordinates."""
+
+    x_min_m: float
+    x_max_m: float
+    y_min_m: float
+    y_max_m: float
+
+
+class ValvesSection(_Section):
+    """The default layout of eight valves, two per side at plus and minus ``arm_m``."""
+
+    thrust_n: Positive = 0.22
+    arm_m: Positive = 0.15
+    min_on_s: Positive = 0.010
+    open_delay_s: NonNegative = 0.006
+    close_delay_s: NonNegative = 0.005
+    rise_s: NonNegative = 0.004
+    period_s: Positive = 0.1
+    max_open_s: Positive = 2.0
+
+
+class ImuSection(_Section):
+    """The IMU block: its port, its place and the white noise of its sensors as densities."""
+
+    baud: Literal[115200, 250000] = 250000
+    protocol: Literal["auto", "v1", "v2"] = "auto"
+    averaging: int | None = Field(default=None, ge=1, le=250)
+    ftdi_latency_s: NonNegative = 0.016
+    position_body_m: tuple[float, float] = (0.0, 0.0)
+    position_sigma_m: NonNegative = 0.001
+    frame_rate_hz: Positive = 100.0
+    gyro_density_rad_s_rthz: Positive
+    acc_density_m_s2_rthz: Positive
+    gyro_tempco_rad_s_k: NonNegative = 0.00035
+    acc_tempco_m_s2_k: NonNegative = 0.0003
+    gyro_bandwidth_hz: NonNegative = 0.0
+    acc_bandwidth_hz: NonNegative = 0.0
+
+
+class StarCameraSection(_Section):
+    """The star camera: calibration files, delay from exposure to arrival, floor of its errors."""
+
+    camera: Path
+    ceiling: Path
+    delay_s: NonNegative = 0.0
+    delay_sigma_s: NonNegative = 0.002
+    timeout_s: Positive = 2.0
+    sigma_xy_m: Positive = 0.001
+    sigma_heading_rad: Positive = 0.0009
+
+
+class FusionSection(_Section):
+    """Which estimator, and how long the rest at the start must be."""
+
+    method: str = "filter"
+    rest_s: Positive = 8.0
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.method not in ESTIMATORS:
+            raise ValueError(f"method {self.method!r} is none of {', '.join(sorted(ESTIMATORS))}")
+        return self
+
+
+class ControlSection(_Section):
+    """Which controller flies the mock-up, and its parameters as that controller defines them."""
+
+    controller: str = "station"
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.controller not in CONTROLLERS:
+            raise ValueError(f"controller {self.controller!r} is none of {', '.join(sorted(CONTROLLERS))}")
+        return self
+
+
+class MockUpSection(_Section):
+    """A type of mock-up; vehicles name one."""
+
+    mass_kg: Positive = 11.0
+    inertia_kg_m2: Positive = 0.25
+    valves: ValvesSection = ValvesSection()
+    imu: ImuSection
+    star_camera: StarCameraSection | None = None
+    fusion: FusionSection = FusionSection()
+    control: ControlSection = ControlSection()
+
+
+class HoldSection(_Section):
+    """Where a vehicle goes once it is armed."""
+
+    x_m: float
+    y_m: float
+    heading_deg: float
+
+
+class VehicleSection(_Section):
+    """One vehicle: its type, its place on the valve bus and where its devices are opened."""
+
+    mock_up: str
+    bus_index: int = Field(ge=0, le=15)
+    imu: str
+    star_camera: str | None = None
+    fixes: str | None = None
+    reference: str | None = None
+    hold: HoldSection
+    starts_by_itself: bool = True
+
+    @model_validator(mode="after")
+    def _one_source_of_fixes(self) -> Self:
+        if (self.star_camera is None) == (self.fixes is None):
+            raise ValueError("needs exactly one of 'star_camera' and 'fixes'")
+        return self
+
+
+class RecordSection(_Section):
+    """Where recordings go, and what is kept of the camera's images."""
+
+    directory: Path = Path("recordings")
+    images: Literal["off", "spots", "lossless"] = "spots"
+
+
+class NodeSection(_Section):
+    """What the rig says about one node: its process, and the time it takes (emulated conditions).
+
+    ``busy_s``: takes one message at a time and answers after this long. ``late_s``: answers late, but
+    takes every message.
+    """
+
+    process: str | None = None
+    busy_s: NonNegative = 0.0
+    late_s: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if self.busy_s and self.late_s:
+            raise ValueError("give either 'busy_s' or 'late_s'")
+        return self
+
+
+class LaboratorySection(BaseModel):
+    """The emulated laboratory: an installed entry point; the other keys are its own."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    entry_point: str
+
+
+class Rig(_Section):
+    """A whole rig."""
+
+    name: str
+    table: TableSection
+    mock_ups: dict[str, MockUpSection]
+    vehicles: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")], VehicleSection] = Field(min_length=1)
+    valve_bus: dict[str, Any] | str
+    record: RecordSection = RecordSection()
+    nodes: dict[str, NodeSection] = Field(default_factory=dict)
+    laboratory: LaboratorySection | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        indices: dict[int, str] = {}
+        for name, vehicle in self.vehicles.items():
+            mock_up = self.mock_ups.get(vehicle.mock_up)
+            if mock_up is None:
+                known = ", ".join(sorted(self.mock_ups)) or "none"
+                raise ValueError(
+                    f"vehicles.{name}.mock_up: {vehicle.mock_up!r} is not among mock_ups ({known})"
+                )
+            if vehicle.star_camera is not None and mock_up.star_camera is None:
+                raise ValueError(
+                    f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera"
+                )
+            if vehicle.bus_index in indices:
+                other = indices[vehicle.bus_index]
+                raise ValueError(f"vehicles.{name}.bus_index: {vehicle.bus_index} is already that of {other}")
+            indices[vehicle.bus_index] = name
+            addresses = {"imu": vehicle.imu, "star_camera": vehicle.star_camera, "fixes": vehicle.fixes}
+            for key, address in addresses.items():
+                if address is not None and address.startswith(LABORATORY) and self.laboratory is None:
+                    raise ValueError(f"vehicles.{name}.{key}: {address!r} needs a [laboratory] section")
+        return self
+
+    def mock_up_of(self, vehicle: str) -> MockUpSection:
+        """The type of a vehicle."""
+        return self.mock_ups[self.vehicles[vehicle].mock_up]
+
+
+def load_rig(path: Path) -> Rig:
+    """Read a rig file.
+
+    Raises:
+        RigError: One sentence with file and key or line.
+    """
+    try:
+        text = path.read_text()
+    except FileNotFoundError as error:
+        raise RigError(f"{path}: there is no such rig file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise RigError(f"{path}: cannot be read as a rig file ({error})") from error
+    return parse_rig(text, path)
+
+
+def parse_rig(text: str, path: Path) -> Rig:
+    """Read the text of a rig file; relative paths inside are taken relative to ``path``.
+
+    Raises:
+        RigError: One sentence with file and key or line.
+    """
+    try:
+        rig = Rig.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise RigError(f"{path}: is not valid TOML: {error}") from error
+    except ValidationError as error:
+        raise RigError(f"{path}: {_first_sentence(error)}") from error
+    return _anchor(rig, path.parent)
+
+
+def _first_sentence(error: ValidationError) -> str:
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"] if part != "[key]")
+    message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        return f"'{where}' is no known key (a typo?)"
+    if first["type"] == "missing":
+        return f"'{where}' is missing"
+    found = "" if first["type"] == "value_error" else f", found {first['input']!r}"
+    return f"{where + ': ' if where else ''}{message}{found}"
+
+
+def _anchor(rig: Rig, folder: Path) -> Rig:
+    """Make calibration paths absolute."""
+    mock_ups = {}
+    for name, mock_up in rig.mock_ups.items():
+        camera = mock_up.star_camera
+        if camera is not None:
+            camera = camera.model_copy(
+                update={"camera": folder / camera.camera, "ceiling": folder / camera.ceiling}
+            )
+        mock_ups[name] = mock_up.model_copy(update={"star_camera": camera})
+    return rig.model_copy(update={"mock_ups": mock_ups})

@@ -1,0 +1,162 @@
+"""A node in a runner: counts, journals and times what it does, the same in live and lockstep."""
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from groundstation.bus.envelope import Cause, Delivered, Envelope
+from groundstation.bus.journal import JournalWriter, Kind
+from groundstation.bus.topics import Scope, Topic, topic_of
+from groundstation.messages.base import Message
+from groundstation.nodes.node import Node
+
+
+class Sequences:
+    """Sequence numbers of everything one process publishes, from 1, per topic and owner."""
+
+    def __init__(self) -> None:
+        self._last: dict[tuple[int, str], int] = {}
+
+    def next(self, topic: Topic, owner: str) -> int:
+        """The next number."""
+        key = (topic.index, owner)
+        number = self._last.get(key, 0) + 1
+        self._last[key] = number
+        return number
+
+
+def owner_of(topic: Topic, payload: Message, process: str) -> str:
+    """Whose topic it is: the vehicle's, nobody's (rig), or the publishing process's."""
+    return process if topic.scope is Scope.PROCESS else payload.vehicle
+
+
+@dataclass(slots=True)
+class Timing:
+    """Emulated time that a node takes, from the rig.
+
+    Attributes:
+        busy_ns: It takes one message at a time and answers after this long.
+        late_ns: It answers late, but takes every message.
+    """
+
+    busy_ns: int = 0
+    late_ns: int = 0
+
+
+@dataclass(slots=True)
+class NodeSlot:
+    """One node with its place in a process.
+
+    Attributes:
+        key: ``vehicle/name``, or ``name`` for a node of the rig.
+        node: The node.
+        process: Name of the process, owner of its process-scoped topics.
+        config_crc: CRC-32 of configuration and calibration, journaled at the start.
+        journal: The journal of the process, shared by its slots.
+        sequences: The counters of the process, shared by its slots.
+        measure: Whether wall and CPU times are measured (not in lockstep: they would differ per run).
+        timing: Emulated duration.
+    """
+
+    key: str
+    node: Node
+    process: str
+    config_crc: int
+    journal: JournalWriter
+    sequences: Sequences
+    measure: bool
+    timing: Timing = field(default_factory=Timing)
+    busy_until_ns: int = 0
+    _newest: dict[int, int] = field(default_factory=dict)
+    _outputs: frozenset[type[Message]] = frozenset()
+
+    def __post_init__(self) -> None:
+        self._outputs = frozenset(self.node.outputs)
+
+    def start(self, now_ns: int) -> list[Delivered]:
+        """Journal the start and collect what the node says first."""
+        self.journal.note(Kind.START, self.key, 0, self.process, self.config_crc, now_ns)
+        return self._wrap(self.node.start(now_ns), now_ns, None)
+
+    def receive(self, delivered: Delivered, now_ns: int) -> list[Delivered]:
+        """Hand one message over; the outputs carry the stamps at which they are to be published."""
+        envelope = delivered.envelope
+        index = envelope.topic.index
+        self._newest[index] = envelope.sequence
+        self.journal.note(Kind.INPUT, self.key, index, envelope.vehicle, envelope.sequence, now_ns)
+        trigger = Cause(index, envelope.sequence)
+        return self._wrap(self.node.receive(delivered.payload, now_ns), now_ns, trigger)
+
+    def tick(self, now_ns: int) -> list[Delivered]:
+        """Let time pass."""
+        self.journal.note(Kind.TICK, self.key, 0, self.process, 0, now_ns)
+        return self._wrap(self.node.tick(now_ns), now_ns, None)
+
+    def stop(self, now_ns: int) -> list[Delivered]:
+        """Collect the node's last words."""
+        self.journal.note(Kind.STOP, self.key, 0, self.process, 0, now_ns)
+        return self._wrap(self.node.stop(now_ns), now_ns, None)
+
+    def drop(self, delivered: Delivered, now_ns: int) -> None:
+        """Journal that a newer message replaced this one before the node was free."""
+        envelope = delivered.envelope
+        self.journal.note(
+            Kind.DROP, self.key, envelope.topic.index, envelope.vehicle, envelope.sequence, now_ns
+        )
+
+    def _wrap(self, said: Iterable[Message], now_ns: int, trigger: Cause | None) -> list[Delivered]:
+        wall_ns = cpu_ns = 0
+        if self.measure:
+            wall_start, cpu_start = time.perf_counter_ns(), time.thread_time_ns()
+            payloads = list(said)  # generators do their work here
+            wall_ns, cpu_ns = time.perf_counter_ns() - wall_start, time.thread_time_ns() - cpu_start
+        else:
+            payloads = list(said)
+        if not payloads:
+            return []
+        publish_ns = now_ns + wall_ns + self.timing.busy_ns + self.timing.late_ns
+        causes = self._causes(trigger)
+        out = []
+        for payload in payloads:
+            kind = type(payload)
+            if kind not in self._outputs:
+                raise TypeError(f"{self.key} said {kind.__name__}, which is not among its outputs")
+            topic = topic_of(kind)
+            owner = owner_of(topic, payload, self.process)
+            sequence = self.sequences.next(topic, owner)
+            self.journal.note(Kind.OUTPUT, self.key, topic.index, owner, sequence, now_ns, wall_ns)
+            envelope = Envelope(topic, owner, sequence, publish_ns, wall_ns, cpu_ns, causes)
+            out.append(Delivered(envelope, payload))
+        return out
+
+    def _causes(self, trigger: Cause | None) -> tuple[Cause, ...]:
+        newest = tuple(
+            Cause(index, sequence)
+            for index, sequence in self._newest.items()
+            if trigger is None or index != trigger.topic_index
+        )
+        return newest if trigger is None else (trigger, *newest)
+
+
+class Dispatch:
+    """Who hears what in one process: topic row and vehicle of the payload to slots."""
+
+    def __init__(self, slots: Iterable[NodeSlot]) -> None:
+        self._table: dict[tuple[int, str], list[NodeSlot]] = {}
+        for slot in slots:
+            for payload in slot.node.inputs:
+                topic = topic_of(payload)
+                vehicles = ("",) if topic.scope is Scope.RIG else slot.node.vehicles_heard(payload)
+                for vehicle in vehicles:
+                    self._table.setdefault((topic.index, vehicle), []).append(slot)
+
+    def hearers(self, topic: Topic, payload: Message) -> list[NodeSlot]:
+        """Slots that hear this payload, in the order of the node table."""
+        return self._table.get((topic.index, payload.vehicle), _NOBODY)
+
+    def topics(self) -> Mapping[tuple[int, str], list[NodeSlot]]:
+        """Everything heard here, by (topic row, vehicle)."""
+        return self._table
+
+
+_NOBODY: list[NodeSlot] = []
