@@ -65,17 +65,17 @@ class Recorder:
         self._writer.add_metadata(METADATA_NAME, info.to_metadata())
         self._file.flush()
 
-    def record(self, delivered: Delivered, log_ns: int) -> None:
+    def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
 
         Args:
             delivered: The payload with its envelope.
-            log_ns: Log time: arrival at the recorder live, moment of publication in lockstep.
+            now_ns: Log time: arrival at the recorder live, moment of publication in lockstep.
         """
         envelope = delivered.envelope
         channel = self._channel(envelope.topic, envelope.vehicle)
         if channel is not None:
-            self._add(channel, envelope, envelope.topic.codec.encode(delivered.payload), log_ns)
+            self._add(channel, envelope, envelope.topic.codec.encode(delivered.payload), now_ns)
 
     def record_encoded(self, envelope: Envelope, data: bytes, log_ns: int) -> None:
         """Write one message whose payload is already in CDR, as it came from the bus."""
@@ -84,7 +84,7 @@ class Recorder:
             self._add(channel, envelope, data, log_ns)
 
     def tick(self, now_ns: int) -> None:
-        """Time passed without a message: close the chunk if it is due. Same clock as ``log_ns``."""
+        """Time passed without a message: close the chunk if it is due. The clock is that of the log times."""
         if self._flush_due_ns is not None and now_ns >= self._flush_due_ns:
             self._flush()
 
