@@ -193,7 +193,9 @@ def _put(out: bytearray, field: _Field, value: Any) -> None:  # noqa: ANN401 a f
     if len(value):
         _pad(out, size)
     if isinstance(value, np.ndarray):
-        out += value.astype(f"<{np.dtype(code).str[1:]}", copy=False).tobytes()
+        if value.dtype.char != code:  # hearers in memory would see other numbers than those of a recording
+            raise TypeError(f"{field.name}: expected {field.base}, found {value.dtype}")
+        out += value.astype(value.dtype.newbyteorder("<"), copy=False).tobytes()
     elif isinstance(value, bytes):
         out += value
     else:

@@ -99,6 +99,13 @@ class Recorder:
             self.part_path.replace(self.path)
         return self.path
 
+    def discard(self) -> None:
+        """Leave no file: for derived recordings whose making failed; does nothing after ``finish``."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+            self.part_path.unlink()
+
     def __enter__(self) -> Self:
         return self
 

@@ -46,7 +46,8 @@ class ReplayRunner:
         output: Takes what the nodes say now; messages said only now carry sequence 0.
 
     Raises:
-        UsageError: A node asked for is not in the journal, or its inputs were not recorded.
+        UsageError: A node asked for is not in the journal, its inputs were not recorded, or nothing is
+            left to replay.
     """
 
     def __init__(
@@ -74,6 +75,9 @@ class ReplayRunner:
                 refused[key] = reason
             else:
                 raise UsageError(f"{recording.path}: {reason}")
+        if not prepared:
+            reason = next(iter(refused.values()), "there is no start of a node in its journal")
+            raise UsageError(f"{recording.path}: {reason}")
         self._replayed_nodes = {key: ReplayedNode(key, node) for key, node in prepared.items()}
         self._report = ReplayReport(tuple(prepared), refused)
         self._comparison = Comparison(tolerances, output)

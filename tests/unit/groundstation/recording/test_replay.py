@@ -321,9 +321,18 @@ def test_a_node_whose_images_were_not_kept_is_refused_in_one_sentence(tmp_path):
     path = fly(tmp_path / "spots.mcap", info=RecordingInfo(images=ImagePolicy.SPOTS))
     with pytest.raises(UsageError, match="alpha/adder cannot be replayed: it hears star_image"):
         replay(path, Looking, nodes=["alpha/adder"])
-    report = replay(path, Looking)
-    assert report.nodes == ()
+    with pytest.raises(UsageError, match="images = 'spots'"):
+        replay(path, Looking)
+    report = replay(path, lambda vehicle: Looking(vehicle) if vehicle == "bravo" else Adder(vehicle))
+    assert report.nodes == ("alpha/adder",)
     assert "images = 'spots'" in report.refused["bravo/adder"]
+
+
+def test_a_recording_without_a_journal_is_refused(tmp_path):
+    with Recorder(tmp_path / "empty.mcap", RecordingInfo()):
+        pass
+    with pytest.raises(UsageError, match="no start of a node"):
+        replay(tmp_path / "empty.mcap")
 
 
 def test_a_recording_that_begins_in_mid_flight_is_refused(tmp_path):

@@ -1,0 +1,91 @@
+"""``groundstation recording``: look into a recording, recover a torn one."""
+
+import tomllib
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from groundstation.cli.errors import UsageError
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.reader import Recording
+from groundstation.recording.recover import recover as recover_file
+from groundstation.recording.writer import PART_SUFFIX
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.callback()
+def recording() -> None:
+    """Look into recordings, recover a torn one."""
+
+
+@app.command()
+def info(file: Annotated[Path, typer.Argument(help="Recording (.mcap).")]) -> None:
+    """Say what a recording holds: where it comes from, and every topic with its rate."""
+    try:
+        with Recording(file) as found:
+            _print_info(found)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+
+
+@app.command()
+def recover(
+    file: Annotated[Path, typer.Argument(help="Torn recording, usually ….mcap.part; it is left as it is.")],
+    out: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
+) -> None:
+    """Bring everything readable of a torn recording into a new one."""
+    target = out or _recovered_name(file)
+    try:
+        found = recover_file(file, target)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    print(f"{target}: {found.messages} messages")
+    if found.was_finished:
+        print(f"{file} had been finished properly")
+    if found.torn_bytes:
+        print(f"{found.torn_bytes} bytes at the torn end held no more messages")
+    if found.damaged_chunks:
+        print(f"{found.damaged_chunks} damaged chunks were left out")
+    if found.orphans:
+        print(f"{found.orphans} messages were left out: their channel stood in a damaged chunk")
+
+
+def _recovered_name(file: Path) -> Path:
+    whole = file.with_name(file.name.removesuffix(PART_SUFFIX))
+    return whole if not whole.exists() else whole.with_stem(f"{whole.stem}_recovered")
+
+
+def _print_info(found: Recording) -> None:
+    span_s = (found.stop_ns - found.start_ns) * 1e-9
+    said = found.info
+    count = sum(channel.count for channel in found.channels)
+    size_mb = found.path.stat().st_size / 1e6
+    print(f"{found.path}: {span_s:.1f} s, {count} messages, {size_mb:.2f} MB")
+    print(f"rig: {_rig_name(said)}; images: {said.images.value}; by: {said.software or 'unknown'}")
+    if said.utc_offset_ns is None:
+        print("clock: virtual" + ("" if said.seed is None else f"; seed: {said.seed}"))
+    else:
+        start = datetime.fromtimestamp(0, UTC) + timedelta(
+            microseconds=(found.start_ns + said.utc_offset_ns) // 1000
+        )
+        print(f"start: {start:%Y-%m-%d %H:%M:%S} UTC")
+    for name, digest in said.calibration_sha256.items():
+        print(f"calibration {name}: sha256 {digest[:16]}…")
+    table = Table("topic", "of", "messages", "rate / Hz", box=None, pad_edge=False)
+    for channel in found.channels:
+        rate_hz = f"{(channel.count - 1) / span_s:.1f}" if span_s > 0 and channel.count > 1 else ""
+        table.add_row(channel.topic.noun, channel.owner, str(channel.count), rate_hz)
+    Console().print(table)
+
+
+def _rig_name(said: RecordingInfo) -> str:
+    try:
+        return str(tomllib.loads(said.rig_toml).get("name", said.rig_path or "unnamed"))
+    except tomllib.TOMLDecodeError:
+        return "unreadable"

@@ -1,0 +1,135 @@
+"""``groundstation replay``: feed a recording through the nodes again and compare."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from groundstation.cli.errors import UsageError
+from groundstation.nodes.node import Node
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.reader import Recording
+from groundstation.recording.software import software
+from groundstation.recording.writer import Recorder
+from groundstation.runtime.node_table import make_node
+from groundstation.runtime.provenance import calibration_hashes
+from groundstation.runtime.replay import ReplayRunner
+from groundstation.runtime.replay_comparison import EXACT, Tolerances, load_tolerances
+from groundstation.runtime.replay_report import ReplayReport
+from groundstation.runtime.rig import Rig, parse_rig
+
+app = typer.Typer(rich_markup_mode=None)
+
+_COUNTS = ("equal", "close", "different", "missing", "extra", "unrecorded")
+
+
+@app.command()
+def replay(
+    recording: Annotated[Path, typer.Argument(help="Recording (.mcap).")],
+    node: Annotated[
+        list[str] | None,
+        typer.Option(help="Node to replay, e.g. alpha/fusion; may be repeated. Default: all."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write what the nodes say now (.mcap).")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file to use instead of the recorded one.")] = None,
+    tolerances: Annotated[
+        Path | None, typer.Option(help="TOML of differences to forgive; without it every bit counts.")
+    ] = None,
+) -> None:
+    """Feed a recording through the nodes again and compare what they say with what they said.
+
+    Exit code 0 if all agrees, 1 if something differs.
+
+    Example: groundstation replay run.mcap --node alpha/fusion --out fusion.mcap
+    """
+    allowed = EXACT if tolerances is None else load_tolerances(tolerances)
+    try:
+        with Recording(recording) as found:
+            report = _replay(found, node, out, rig, allowed)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    _print_report(report)
+    if not report.agrees:
+        raise typer.Exit(1)
+
+
+def _replay(
+    found: Recording, nodes: list[str] | None, out: Path | None, rig_path: Path | None, allowed: Tolerances
+) -> ReplayReport:
+    info, rig = _rig_of(found, rig_path)
+    for name, digest in calibration_hashes(rig).items():
+        if found.info.calibration_sha256.get(name, digest) != digest:
+            print(f"calibration {name} is not the one of the recording")
+    output = None if out is None else Recorder(out, replace(info, software=software()))
+    try:
+        report = ReplayRunner(found, _factory(rig), nodes, allowed, output).run()
+    except BaseException:  # no partial output, not even on Ctrl-C
+        if output is not None:
+            output.discard()
+        raise
+    if output is not None:
+        print(f"replayed: {output.finish()}")
+    return report
+
+
+def _rig_of(found: Recording, rig_path: Path | None) -> tuple[RecordingInfo, Rig]:
+    info = found.info
+    if rig_path is not None:
+        try:
+            info = replace(info, rig_toml=rig_path.read_text(), rig_path=str(rig_path))
+        except (OSError, UnicodeDecodeError) as error:
+            raise UsageError(f"{rig_path}: cannot be read as a rig file ({error})") from error
+    elif not info.rig_toml:
+        raise UsageError(f"{found.path} carries no rig: give one with --rig")
+    return info, parse_rig(info.rig_toml, Path(info.rig_path))
+
+
+def _factory(rig: Rig) -> Callable[[str], Node]:
+    def make(key: str) -> Node:
+        try:
+            return make_node(rig, key)
+        except KeyError:
+            raise UsageError(f"the rig {rig.name!r} has no node {key!r}") from None
+
+    return make
+
+
+def _print_report(report: ReplayReport) -> None:
+    console = Console()
+    for reason in report.refused.values():
+        print(reason)
+    for name, count in report.missing_inputs.items():
+        print(f"{name}: {count} messages that the node consumed are not in the recording")
+    table = Table(
+        "topic",
+        "of",
+        "equal",
+        "close",
+        "different",
+        "missing",
+        "extra",
+        "unrecorded",
+        box=None,
+        pad_edge=False,
+    )
+    for result in report.results:
+        counts = (
+            result.equal,
+            result.close,
+            result.different,
+            result.missing,
+            result.extra,
+            result.unrecorded,
+        )
+        table.add_row(result.noun, result.owner, *(str(count) if count else "" for count in counts))
+    console.print(table)
+    for result in report.results:
+        if result.first is not None:
+            print(f"{result.owner}/{result.noun}: first difference in {result.first}")
+    verdict = "all agrees" if report.agrees else "NOT the same"
+    print(f"{len(report.nodes)} nodes, {report.inputs} inputs, {report.ticks} ticks: {verdict}")
