@@ -2,12 +2,9 @@
 
 import importlib
 import sys
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import click
 import typer
-from typer.core import TyperGroup
-from typer.main import get_command
 
 from drivers.errors import DeviceError
 from groundstation.runtime.errors import GroundStationError, UsageError
@@ -37,43 +34,49 @@ COMMANDS = {
 }
 
 
-class _LazyGroup(TyperGroup):
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        del ctx
-        return list(COMMANDS)
+def build(called: str | None) -> typer.Typer:
+    """The command line: the sub-command that is called is imported, of the others only the summary shows.
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        del ctx
-        row = COMMANDS.get(cmd_name)
-        if row is None:
-            return None
-        module, _, attribute = row.target.partition(":")
-        found: Any = getattr(importlib.import_module(module), attribute)
-        command = get_command(found)
-        command.name = cmd_name
-        return command
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        del ctx
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, row.summary) for name, row in COMMANDS.items()])
-
-
-app = typer.Typer(cls=_LazyGroup, no_args_is_help=True, add_completion=False, rich_markup_mode=None)
-
-
-@app.callback()
-def _root() -> None:
-    """Ground station for planar satellite testbeds.
-
-    Example: groundstation run examples/rigs/two_mock_ups.toml
+    Args:
+        called: Name of the sub-command, None or unknown for the overview.
     """
+    app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+
+    @app.callback()
+    def root() -> None:
+        """Ground station for planar satellite testbeds.
+
+        Example: groundstation run examples/rigs/two_mock_ups.toml
+        """
+
+    for name, row in COMMANDS.items():
+        if name != called:
+            app.command(name, help=row.summary)(_not_called)
+            continue
+        module, _, attribute = row.target.partition(":")
+        found: typer.Typer = getattr(importlib.import_module(module), attribute)
+        if (
+            len(found.registered_commands) == 1
+            and not found.registered_groups
+            and not found.registered_callback
+        ):
+            only = found.registered_commands[0]
+            only.name = name
+            app.registered_commands.append(only)
+        else:
+            app.add_typer(found, name=name, help=row.summary)
+    return app
+
+
+def _not_called() -> None:
+    """Stand in for a command in the overview."""
 
 
 def main() -> None:
     """Entry point: every error of ours is one sentence and exit code 2."""
+    words = sys.argv[1:]
     try:
-        app()
+        build(words[0] if words else None)()
     except (UsageError, DeviceError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         raise SystemExit(2) from None

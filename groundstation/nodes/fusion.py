@@ -133,7 +133,6 @@ class Fusion(Node):
         )
 
     def _say(self, state: PlanarState) -> VehicleState:
-        std = np.sqrt(np.diagonal(self._estimator.covariance())).tolist()
         return VehicleState(
             state.t_ns,
             self.vehicle,
@@ -141,7 +140,7 @@ class Fusion(Node):
             wrap_angle(state.heading_rad),
             (state.vx_m_s, state.vy_m_s),
             state.omega_rad_s,
-            tuple(std),
+            (state.std_x_m, state.std_y_m, state.std_heading_rad),
             _status(state),
             self._fix_stamp_ns,
         )

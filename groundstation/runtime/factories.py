@@ -12,8 +12,8 @@ from groundstation.control.mux import MuxConfig
 from groundstation.control.registry import make_controller
 from groundstation.control.state import Goal
 from groundstation.control.vehicle import VehicleModel, square_of_eight
-from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
+from groundstation.fusion.registry import ESTIMATORS
 from groundstation.nodes.allocation import Allocation
 from groundstation.nodes.command_mux import CommandMux
 from groundstation.nodes.controller import Controller

@@ -10,6 +10,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from groundstation.bus.envelope import Delivered, Envelope
@@ -41,6 +42,21 @@ class _FromPort(NamedTuple):
 
 class _Newest(NamedTuple):
     key: str
+
+
+@dataclass(slots=True)
+class _Ticking:
+    """When a node is to be ticked next."""
+
+    slot: NodeSlot
+    period_ns: int
+    due_ns: int
+
+    def advance(self, now_ns: int) -> None:
+        """Keep the grid; after a delay of more than a period leave ticks out rather than crowd them."""
+        self.due_ns += self.period_ns
+        if self.due_ns <= now_ns:
+            self.due_ns = now_ns + self.period_ns
 
 
 class LiveProcess:
@@ -107,24 +123,25 @@ class LiveProcess:
         for thread in self._threads:
             thread.start()
         self._bus.announce(self._process)
-        ticks = [[now_ns + s.node.tick_period_ns, s] for s in self._slots if s.node.tick_period_ns]
+        ticks = [
+            _Ticking(slot, slot.node.tick_period_ns, now_ns + slot.node.tick_period_ns)
+            for slot in self._slots
+            if slot.node.tick_period_ns
+        ]
         next_journal_ns, next_latch_ns = now_ns + JOURNAL_PERIOD_NS, now_ns + LATCH_PERIOD_NS
         while not self._stopping.is_set():
-            due_ns = min((tick[0] for tick in ticks), default=next_journal_ns)  # type: ignore[type-var]
-            due_ns = min(due_ns, next_journal_ns)  # type: ignore[type-var]
+            due_ns = min((tick.due_ns for tick in ticks), default=next_journal_ns)
+            due_ns = min(due_ns, next_journal_ns)
             if self._held:
-                due_ns = min(due_ns, self._held[0][0])  # type: ignore[type-var]
-            self._take(due_ns)  # type: ignore[arg-type]
+                due_ns = min(due_ns, self._held[0][0])
+            self._take(due_ns)
             now_ns = time.monotonic_ns()
             self._release(now_ns)
             for tick in ticks:
-                slot = tick[1]
-                assert isinstance(slot, NodeSlot)
-                if tick[0] <= now_ns:  # type: ignore[operator]
-                    self._publish(slot.tick(now_ns))
+                if tick.due_ns <= now_ns:
+                    self._publish(tick.slot.tick(now_ns))
                     self._drain()
-                    period_ns = slot.node.tick_period_ns
-                    tick[0] = max(tick[0] + period_ns, now_ns + period_ns // 2)  # type: ignore[operator,type-var]
+                    tick.advance(now_ns)
             if now_ns >= next_journal_ns:
                 self._publish_journal(now_ns)
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS
@@ -176,13 +193,16 @@ class LiveProcess:
             item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
         except queue.Empty:
             return
+        found: _Remote | _FromPort | None
         if isinstance(item, _Newest):
             with self._newest_lock:
-                item = self._newest.pop(item.key)
-        if isinstance(item, _Remote):
-            self._remote(item)
-        elif isinstance(item, _FromPort):
-            self._publish_from_port(item.port.to_message(item.stamp_ns, item.data))
+                found = self._newest.pop(item.key)
+        else:
+            found = item
+        if isinstance(found, _Remote):
+            self._remote(found)
+        elif isinstance(found, _FromPort):
+            self._publish_from_port(found.port.to_message(found.stamp_ns, found.data))
         self._drain()
 
     def _remote(self, item: _Remote) -> None:

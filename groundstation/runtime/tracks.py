@@ -59,7 +59,7 @@ def read_tracks(source: Recording) -> dict[str, Track]:
         payload = delivered.payload
         name = payload.vehicle
         if name not in tracks:
-            tracks[name] = Track(*(np.empty((0, width)) for width in (7, 7, 4, 2)))
+            tracks[name] = Track(np.empty((0, 7)), np.empty((0, 7)), np.empty((0, 4)), np.empty((0, 2)))
             rows[name] = {"truth": [], "state": [], "goal": [], "open_masks": []}
         track, row = tracks[name], rows[name]
         t_s = (payload.stamp_ns - start_ns) * 1e-9
@@ -75,7 +75,7 @@ def read_tracks(source: Recording) -> dict[str, Track]:
                     )
                 )
             case m.VehicleState():
-                row["state"].append((t_s, *payload.position_table_m, payload.heading_rad, *payload.std[:3]))
+                row["state"].append((t_s, *payload.position_table_m, payload.heading_rad, *payload.pose_std))
             case m.ControlStatus():
                 row["goal"].append((t_s, *payload.goal_position_table_m, payload.goal_heading_rad))
             case m.ValveCommand():
