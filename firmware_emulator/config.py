@@ -4,6 +4,7 @@ The rig file speaks degrees where people do (`_deg` in the key); everything past
 radians. Unknown keys are refused.
 """
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -231,11 +232,17 @@ class LaboratoryConfig(Settings):
 
     name: str = "emulator"
     """The entry point that made this laboratory."""
+    folder: str = ""
+    """Where relative paths start: the rig file's folder, filled in by who reads the rig; else the current."""
     seed: Annotated[int, Field(ge=0)] = 0
     table: TableConfig = TableConfig()
     vehicles: Annotated[tuple[VehicleConfig, ...], Field(min_length=1, max_length=MAX_VEHICLES)]
     faults: tuple[FaultConfig, ...] = ()
     bus_bitrate: Positive = 500_000.0
+
+    def path(self, path: str) -> str:
+        """A path of the scenario as seen from here."""
+        return str(Path(self.folder) / path)
 
     @model_validator(mode="after")
     def _names_are_unique_and_known(self) -> "LaboratoryConfig":

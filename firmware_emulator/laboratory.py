@@ -11,16 +11,18 @@ import numpy as np
 
 from drivers.laboratory import Arrival, CameraFrame, CanFrame, ChannelKind
 from firmware_emulator.config import LaboratoryConfig
+from firmware_emulator.devices.scene import SceneRenderer
 from firmware_emulator.devices.star_camera import Exposure, Renderer
 from firmware_emulator.devices.valve_bus import ValveBus
 from firmware_emulator.faults import Faults
 from firmware_emulator.mock_up import MockUp, Random, build_mock_up
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.contacts import Contacts
+from firmware_emulator.sky.sky_camera import Shutter
 
 VALVE_BUS = "valve_bus"
 _TABLE_STREAM = 0  # spawn keys of the random streams: the table, then vehicles from 1
-_PARTS = ("crystal", "valves", "node", "imu errors", "imu noise", "line", "housekeeping", "camera", "sky")
+_PARTS = ("crystal", "valves", "node", "imu errors", "imu noise", "line", "housekeeping", "camera")
 
 
 class _Device(Protocol):
@@ -154,10 +156,6 @@ class EmulatedLaboratory:
     def close(self) -> None:
         """Nothing to release: everything is in memory."""
 
-    def sky_seed(self, index: int) -> np.random.SeedSequence:
-        """Seed of the pictures of vehicle `index`, for whoever draws them."""
-        return self._seeds(1 + index, self.config.vehicles[index].seed_offset, _PARTS.index("sky"))
-
     def _seeds(self, stream: int, offset: int, part: int) -> np.random.SeedSequence:
         return np.random.SeedSequence([self._seed, self.config.seed], spawn_key=(stream, offset, part))
 
@@ -166,7 +164,18 @@ class EmulatedLaboratory:
         return lambda part: np.random.default_rng(self._seeds(1 + index, offset, _PARTS.index(part)))
 
     def _build_renderers(self) -> dict[str, Renderer]:
-        return {}
+        renderers: dict[str, Renderer] = {}
+        for index, vehicle in enumerate(self.config.vehicles):
+            camera = vehicle.camera
+            if camera.source == "rendered":
+                renderers[vehicle.name] = SceneRenderer.load(
+                    self.config.path(camera.ceiling),
+                    self.config.path(camera.camera),
+                    Shutter(camera.exposure_s, camera.readout_s),
+                    sky_seed(self.config, self._seed),
+                    camera_seed(self.config, self._seed, index),
+                )
+        return renderers
 
     def _wire(self) -> tuple[list[_Device], list[Callable[[int], None]]]:
         """All devices, and how each is run."""
@@ -222,6 +231,16 @@ class _ContactWatch:
 
     def run(self, now_ns: int) -> None:
         self.next_ns = self._laboratory.resolve_contacts(now_ns)
+
+
+def sky_seed(config: LaboratoryConfig, seed: int) -> list[int]:
+    """Seed of the sky, which all cameras share, for whoever draws it."""
+    return [seed, config.seed]
+
+
+def camera_seed(config: LaboratoryConfig, seed: int, index: int) -> list[int]:
+    """Seed of the noise of vehicle `index`'s camera, for whoever draws its pictures."""
+    return [seed, config.seed, 1 + index, config.vehicles[index].seed_offset]
 
 
 def _stamp(arrival: Arrival) -> int:

@@ -69,13 +69,15 @@ class SerialLine:
 
         Args:
             next_send_ns: Nothing is sent before.
-            next_bytes: So many are sent then,
-            quiet_ns: and nothing more until so long after.
+            next_bytes: So many, at most, are sent then,
+            quiet_ns: and again every so often.
         """
         if self._packets:
             return self._packets[0][0]
         missing = PACKET_BYTES - len(self._waiting)
-        full_ns = next_send_ns + (int(missing * self.byte_ns) if missing <= next_bytes else quiet_ns)
+        sends_before = (missing - 1) // next_bytes
+        full_ns = next_send_ns + sends_before * quiet_ns
+        full_ns += int((missing - sends_before * next_bytes) * self.byte_ns)
         timer_ns = self._timer_ns if self._waiting else next_send_ns + int(self.byte_ns) + self._latency_ns
         return min(timer_ns, full_ns) + self._jitter_ns
 

@@ -1,0 +1,157 @@
+"""Draws the pictures of all star cameras and serves them over HTTP, in a process of its own.
+
+Drawing takes milliseconds of CPU; in the process that paces the serial lines it would delay bytes. The
+parent says on stdin, one JSON line each, first what cameras there are, then every exposure; end of file
+ends this process. On stdout it says its port once.
+"""
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_emulator.devices.scene import SceneError, SceneRenderer
+from firmware_emulator.devices.star_camera import Exposure, Renderer
+from firmware_emulator.live.tcp_server import LOOPBACK
+from firmware_emulator.sky.sky_camera import Shutter
+
+BOUNDARY = "picture"
+NS_PER_S = 1_000_000_000
+
+
+class LiveCamera:
+    """Pictures of one camera, each published when it is due; who is slow misses pictures.
+
+    Args:
+        renderer: Draws.
+        jpeg_quality: For the MJPEG stream.
+    """
+
+    def __init__(self, renderer: Renderer, jpeg_quality: int) -> None:
+        self._renderer = renderer
+        self._jpeg_quality = jpeg_quality
+        self._changed = threading.Condition()
+        self._orders: deque[Exposure] = deque()
+        self._newest: tuple[int, NDArray[np.uint8]] | None = None
+        self._published = 0
+        threading.Thread(target=self._work, daemon=True).start()
+
+    def order(self, exposure: Exposure) -> None:
+        """Ask for a picture."""
+        with self._changed:
+            self._orders.append(exposure)
+            self._changed.notify_all()
+
+    def wait(self, seen: int) -> tuple[int, int, NDArray[np.uint8]]:
+        """Block for a picture newer than number `seen`; return its number, sequence and image."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._published > seen)
+            if self._newest is None:
+                raise RuntimeError("published without a picture")
+            return self._published, *self._newest
+
+    def part(self, sequence: int, image: NDArray[np.uint8], is_jpeg: bool) -> bytes:
+        """One part of the multipart stream."""
+        height, width = image.shape
+        if is_jpeg:
+            kind = "image/jpeg"
+            body = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self._jpeg_quality])[1].tobytes()
+        else:
+            kind, body = "application/x-mono8", image.tobytes()
+        head = (
+            f"--{BOUNDARY}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
+            f"X-Width: {width}\r\nX-Height: {height}\r\nX-Sequence: {sequence}\r\n\r\n"
+        )
+        return head.encode("ascii") + body + b"\r\n"
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: bool(self._orders))
+                exposure = self._orders.popleft()
+            image = self._renderer.render(exposure)
+            time.sleep(max(0, exposure.arrival_ns - time.monotonic_ns()) / NS_PER_S)
+            with self._changed:
+                self._newest = (exposure.sequence, image)
+                self._published += 1
+                self._changed.notify_all()
+
+
+def make_server(cameras: dict[str, LiveCamera]) -> ThreadingHTTPServer:
+    """A server on a free loopback port: `/<vehicle>.raw` and `/<vehicle>.mjpeg`."""
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_GET(self) -> None:
+            name, _, kind = self.path.lstrip("/").partition(".")
+            if name not in cameras or kind not in ("raw", "mjpeg"):
+                self.send_error(HTTPStatus.NOT_FOUND)
+                return
+            self.close_connection = True
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+            self.send_header("Cache-Control", "no-store")
+            self.send_header("Connection", "close")
+            self.end_headers()
+            self._stream(cameras[name], is_jpeg=kind == "mjpeg")
+
+        def _stream(self, camera: LiveCamera, is_jpeg: bool) -> None:
+            seen = 0
+            try:
+                while True:
+                    seen, sequence, image = camera.wait(seen)
+                    self.wfile.write(camera.part(sequence, image, is_jpeg))
+            except OSError:  # the client left: its right
+                return
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's name
+            return
+
+    class Server(ThreadingHTTPServer):
+        daemon_threads = True
+        block_on_close = False
+
+    return Server((LOOPBACK, 0), Handler)
+
+
+def main() -> int:
+    """Serve until stdin ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    cv2.setNumThreads(1)
+    cameras: dict[str, LiveCamera] = {}
+    try:
+        for row in json.loads(sys.stdin.readline()):
+            renderer = SceneRenderer.load(
+                row["ceiling"],
+                row["camera"],
+                Shutter(row["exposure_s"], row["readout_s"]),
+                row["sky_seed"],
+                row["camera_seed"],
+            )
+            cameras[row["name"]] = LiveCamera(renderer, row["jpeg_quality"])
+    except SceneError as error:
+        print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201 - the answer to the parent
+        return 2
+    server = make_server(cameras)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    print(json.dumps({"port": server.server_address[1]}), flush=True)  # noqa: T201 - likewise
+    for line in sys.stdin:
+        name, fields = json.loads(line)
+        cameras[name].order(Exposure(**fields))
+    return 0
+
+
+if __name__ == "__main__":
+    status = main()
+    sys.stdout.flush()
+    os._exit(status)  # threads that wait for slow clients must not hold the process
