@@ -50,8 +50,8 @@ def test_texts_and_integers_have_no_tolerance():
 
 def test_tolerances_are_read_from_toml(tmp_path):
     path = tmp_path / "t.toml"
-    path.write_text("[state]\nheading_rad = 1e-9\nstd = 1\n")
-    assert load_tolerances(path) == {"state": {"heading_rad": 1e-9, "std": 1}}
+    path.write_text("[wrench]\nforce_x_n = 1e-9\n[fix_account]\nnis = 1\n")
+    assert load_tolerances(path) == {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
 
 
 @pytest.mark.parametrize(
@@ -59,11 +59,11 @@ def test_tolerances_are_read_from_toml(tmp_path):
     [
         ("[sate]\n", "'sate' is no topic"),
         ("state = 1\n", "expected a table"),
-        ("[state]\nheading_deg = 1\n", "no field of floating-point"),
-        ("[state]\nstatus = 1\n", "no field of floating-point"),
-        ("[state]\nheading_rad = -1\n", "from 0 up"),
-        ("[state]\nheading_rad = nan\n", "from 0 up"),
-        ("[state]\nheading_rad = true\n", "from 0 up"),
+        ("[wrench]\nforce_x_kn = 1\n", "no field of floating-point"),
+        ("[control_status]\ncontroller = 1\n", "no field of floating-point"),
+        ("[wrench]\nforce_x_n = -1\n", "from 0 up"),
+        ("[wrench]\nforce_x_n = nan\n", "from 0 up"),
+        ("[wrench]\nforce_x_n = true\n", "from 0 up"),
         ("[state\n", "cannot be read"),
     ],
 )
