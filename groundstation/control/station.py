@@ -47,7 +47,7 @@ class StationConfig(BaseModel):
     acceleration_m_s2: float = Field(default=0.010, gt=0.0)
     largest_error_m: float = Field(default=0.10, gt=0.0)
     position_deadband_m: float = Field(default=0.0015, ge=0.0)
-    observer_rad_s: float = Field(default=0.45, gt=0.0)
+    observer_rad_s: float = Field(default=0.35, gt=0.0)
     largest_slope_m_s2: float = Field(default=0.010, ge=0.0)
     heading_error_deg: float = Field(default=0.3, gt=0.0)
     angular_acceleration_deg_s2: float = Field(default=0.5, gt=0.0)

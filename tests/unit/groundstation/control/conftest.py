@@ -113,6 +113,7 @@ def fly(
     duration_s: float = 60.0,
     world: World = World(),
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    start_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     pulse: PulseConfig = PulseConfig(),  # noqa: B008  frozen
     update_s: float = 0.02,
     vehicle: VehicleModel | None = None,
@@ -128,9 +129,9 @@ def fly(
     constant = np.array((*world.slope_table_m_s2, world.disturbance_torque_nm / vehicle.inertia_kg_m2))
     steps = round(pulse.period_s / STEP_S)
     instants = np.arange(steps) * STEP_S
-    pose, velocity = np.array(start, dtype=float), np.zeros(3)
+    pose, velocity = np.array(start, dtype=float), np.array(start_velocity, dtype=float)
     late_steps = round(world.latency_s / STEP_S)
-    poses, speeds = np.tile(pose, (late_steps + 1, 1)), np.zeros((late_steps + 1, 3))
+    poses, speeds = np.tile(pose, (late_steps + 1, 1)), np.tile(velocity, (late_steps + 1, 1))
     close_at_s = np.full(len(vehicle.valves), -1.0)  # from the start of the period
     flight, wrench, pulses = Flight(), NO_WRENCH, None
     for count in range(round(duration_s / pulse.period_s)):

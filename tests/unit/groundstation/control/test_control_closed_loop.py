@@ -5,6 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from groundstation.control.brake import BrakeConfig, brake_wrench
+from groundstation.control.edge import edge_outlook
+from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.formation import Formation, FormationConfig, RelativePose
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import rectangle
@@ -176,6 +179,40 @@ def test_consensus_meets_between_the_own_goal_and_the_neighbour(vehicle):
 def test_a_formation_without_anybody_is_refused():
     with pytest.raises(ValueError, match="needs neighbours"):
         FormationConfig()
+
+
+class Braking:
+    """The brake law in the place of a controller."""
+
+    def __init__(self, vehicle):
+        self._vehicle, self._envelope = vehicle, WrenchEnvelope(vehicle)
+
+    def update(self, state, goal, dt_s, **_unused):
+        return brake_wrench(state, BrakeConfig(), self._vehicle, self._envelope)
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 0.7])
+def test_pulsed_braking_stops_a_coasting_mock_up_before_the_predicted_line(fly, vehicle, world, heading_rad):
+    level = world(slope_table_m_s2=(0.0, 0.0), thrust_spread=0.0)
+    flight = fly(
+        Braking(vehicle),
+        HERE,
+        world=level,
+        start=(-0.5, 0.0, heading_rad),
+        start_velocity=(0.15, 0.0, math.radians(8.0)),
+        duration_s=12.0,
+    )
+    predicted = edge_outlook(
+        ControlState((-0.5, 0.0), (0.15, 0.0), heading_rad, 0.0),
+        rectangle((4.0, 4.0)),
+        0.036,
+        reaction_s=0.15,
+    )
+    velocity = np.array(flight.velocity)
+    assert np.hypot(*velocity[-1, :2]) < 0.006
+    assert abs(velocity[-1, 2]) < math.radians(2.5)
+    # full braking to the line; the last 5 mm/s die out over some seconds
+    assert flight.pose[-1][0] + 0.5 < predicted.stopping_distance_m + 0.03
 
 
 @pytest.mark.slow
