@@ -14,7 +14,7 @@ camera-delay calibration finds.
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.imu_block.frame_v1 import V1_WIRE_BYTES
@@ -38,6 +38,8 @@ _LATE_NS = 150e6
 _LOST_NS = 50e6
 _LOST_BLOCKS = 5
 _READS_KEPT = 64
+FIRST_JITTER_NS = 3e6
+"""Host delay assumed before any is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +91,11 @@ class TickClock:
         self._reads: deque[tuple[int, int]] = deque(maxlen=_READS_KEPT)
         self._origin_ns = 0
         self._envelope = LowerEnvelope()
-        self._tick: int | None = None
+        self._is_started = False
+        self._tick = 0
         self._raw_tick = 0
+        self._taught: list[tuple[int, int | None]] = []
+        self._stamps: list[TickStamp] = []
         self._last_stamp_ns: int | None = None
         self._shape = (0, 0)
         self._common_delay_ns = 0.0
@@ -106,7 +111,7 @@ class TickClock:
         """Host time per block time minus one; positive when the block's clock is slow."""
         return self._envelope.drift
 
-    def update(self, arrival_ns: int, chunk_bytes: int, frames: Iterable[ImuFrame]) -> list[TickStamp]:
+    def update(self, arrival_ns: int, chunk_bytes: int, frames: Sequence[ImuFrame]) -> list[TickStamp]:
         """Stamp the frames that one read completed.
 
         Args:
@@ -118,19 +123,25 @@ class TickClock:
         self._bytes_read += chunk_bytes
         if chunk_bytes:
             self._reads.append((self._bytes_read - 1, arrival_ns))
-        return [self._stamp(frame, start + frame.end_offset, arrival_ns) for frame in frames]
+        # A read after a pause holds old frames and new: all teach before the first is stamped.
+        self._stamps = []
+        last = frames[-1] if frames else None
+        for frame in frames:
+            end = start + frame.end_offset
+            size = V1_WIRE_BYTES if frame.version == 1 else V2_WIRE_BYTES
+            if self._shape != (size, frame.sample_count):
+                self._shape = (size, frame.sample_count)
+                self._common_delay_ns = self._longest_common_delay_ns()
+            latest_end_ns = arrival_ns - (self._bytes_read - 1 - end) * self._byte_ns
+            elapsed = self._unwrap(frame, latest_end_ns - self._send_delay_ns - size * self._byte_ns)
+            self._learn(end, size, latest_end_ns, frame is last)
+            self._taught.append((self._tick, elapsed))
+        self._stamp_taught()
+        return self._stamps
 
-    def _stamp(self, frame: ImuFrame, end: int, arrival_ns: int) -> TickStamp:
-        size = V1_WIRE_BYTES if frame.version == 1 else V2_WIRE_BYTES
-        if self._shape != (size, frame.sample_count):
-            self._shape = (size, frame.sample_count)
-            self._common_delay_ns = self._longest_common_delay_ns()
-        latest_end_ns = arrival_ns - (self._bytes_read - 1 - end) * self._byte_ns
-        elapsed = self._unwrap(frame, latest_end_ns - self._send_delay_ns - size * self._byte_ns)
-        assert self._tick is not None
-        device_ns = float(self._tick * TICK_NS)
-        self._learn(device_ns, end, size, latest_end_ns)
-        return self._slewed(device_ns, elapsed)
+    def _stamp_taught(self) -> None:
+        self._stamps += [self._slewed(tick, elapsed) for tick, elapsed in self._taught]
+        self._taught = []
 
     def _unwrap(self, frame: ImuFrame, latest_edge_ns: float) -> int | None:
         """Advance the unwrapped tick; return the ticks since the last frame, None at a new epoch."""
@@ -138,7 +149,7 @@ class TickClock:
             raw, modulus = frame.tick_ms, 65536
         else:
             raw, modulus = (frame.sequence or 0) * frame.sample_count, 256 * frame.sample_count
-        if self._tick is None:
+        if not self._is_started:
             self._start(raw, latest_edge_ns)
             return None
         elapsed = (raw - self._raw_tick) % modulus
@@ -163,16 +174,19 @@ class TickClock:
         return latest_edge_ns - self._origin_ns - device_ns - self._envelope.height_ns(device_ns)
 
     def _start(self, raw: int, latest_edge_ns: float) -> None:
+        self._is_started = True
         self._tick = self._raw_tick = raw
         self._origin_ns = round(latest_edge_ns) - raw * TICK_NS
 
     def _restart(self, raw: int, latest_edge_ns: float) -> None:
+        self._stamp_taught()
         self.epoch += 1
         self._envelope = LowerEnvelope()
         self._start(raw, latest_edge_ns)
 
-    def _learn(self, device_ns: float, end: int, size: int, latest_end_ns: float) -> None:
-        """Give the envelope every read whose last byte lies in this frame, and this frame's own bound."""
+    def _learn(self, end: int, size: int, latest_end_ns: float, is_last: bool) -> None:
+        """Give the envelope each read that ended within this frame, and the last frame's own bound."""
+        device_ns = float(self._tick * TICK_NS)
         departure_ns = self._origin_ns + device_ns + self._send_delay_ns
         reads = self._reads
         while reads and reads[0][0] <= end:
@@ -180,12 +194,12 @@ class TickClock:
             sent = last_byte - (end - size)
             if sent > 0:
                 self._envelope.add(device_ns, arrival_ns - departure_ns - sent * self._byte_ns)
-        if end < self._bytes_read - 1:
+        if is_last and end < self._bytes_read - 1:
             self._envelope.add(device_ns, latest_end_ns - departure_ns - size * self._byte_ns)
 
-    def _slewed(self, device_ns: float, elapsed: int | None) -> TickStamp:
+    def _slewed(self, tick: int, elapsed: int | None) -> TickStamp:
         """Move the stamp towards the line no faster than allowed; say how sure it is."""
-        assert self._tick is not None
+        device_ns = float(tick * TICK_NS)
         line_ns = self._envelope.height_ns(device_ns) - self._common_delay_ns / 2
         wanted_ns = self._origin_ns + round(device_ns + line_ns)
         stamp_ns = wanted_ns
@@ -197,11 +211,11 @@ class TickClock:
             if self.is_locked and elapsed is not None:
                 stamp_ns = min(stamp_ns, self._last_stamp_ns + math.floor(nominal_ns * (1 + limit)))
         self._last_stamp_ns = stamp_ns
-        return TickStamp(stamp_ns, self._std_s(stamp_ns - wanted_ns), self._tick, elapsed, self.epoch)
+        return TickStamp(stamp_ns, self._std_s(stamp_ns - wanted_ns), tick, elapsed, self.epoch)
 
     def _std_s(self, lag_ns: int) -> float:
         envelope = self._envelope
-        first_guess_ns = max(self._timer_ns, 1e6) + 1e6
+        first_guess_ns = max(self._timer_ns, 1e6) + FIRST_JITTER_NS
         line_ns = max(envelope.scatter_ns, 20e3) + 2 * first_guess_ns / (envelope.points_seen + 1)
         line_ns += 2 * DRIFT_LIMIT * BLOCK_NS / (envelope.blocks_closed + 1)
         variance_ns2 = self._common_delay_ns**2 / 12 + (SEND_DELAY_STD_S * 1e9) ** 2 + line_ns**2
