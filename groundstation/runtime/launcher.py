@@ -166,7 +166,8 @@ class Launcher:
             start_new_session=True,
             env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
         )
-        child.started_s = child.last_heard_s = time.monotonic()
+        child.started_s = time.monotonic()
+        child.last_heard_s = 0.0  # judged only from its first journal on; the recorder keeps none
         child.is_ready = False
         assert child.popen.stdin is not None
         try:
@@ -179,7 +180,7 @@ class Launcher:
         laboratory, section = self._laboratory, self._rig.laboratory
         assert laboratory is not None
         assert section is not None
-        package = _package_of(section.entry_point)
+        package = _package_of(section.name)
         laboratory.popen = subprocess.Popen(
             [sys.executable, "-m", package, str(self._rig_path)],
             stdin=subprocess.PIPE,
@@ -246,7 +247,7 @@ def _package_of(name: str) -> str:
     found = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
     if name not in found:
         known = ", ".join(sorted(found)) or "none"
-        raise RigError(f"laboratory.entry_point: {name!r} is not installed (installed: {known})")
+        raise RigError(f"laboratory.name: {name!r} is not installed (installed: {known})")
     return found[name].module.partition(".")[0]
 
 

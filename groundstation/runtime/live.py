@@ -139,9 +139,10 @@ class LiveProcess:
             self._release(now_ns)
             for tick in ticks:
                 if tick.due_ns <= now_ns:
-                    self._publish(tick.slot.tick(now_ns))
+                    told_ns = time.monotonic_ns()  # a node is never told an earlier moment than before
+                    self._publish(tick.slot.tick(told_ns))
                     self._drain()
-                    tick.advance(now_ns)
+                    tick.advance(told_ns)
             if now_ns >= next_journal_ns:
                 self._publish_journal(now_ns)
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS
@@ -160,6 +161,7 @@ class LiveProcess:
             for kind in slot.node.outputs
             if topic_of(kind).scope is Scope.VEHICLE
         }
+        made_here |= {(topic_of(t.port.reads).index, t.port.vehicle) for t in self._threads}
         keys = set()
         for index, vehicle in self._dispatch.topics():
             topic = TOPICS[index]
@@ -318,6 +320,8 @@ class LiveProcess:
 
 class _TroublePort(PortTranslation):
     """Turns what a port thread has to say about its device into a ``Diagnostics`` message."""
+
+    reads = Diagnostics
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel, channel.rpartition("/")[0], None, "")

@@ -31,9 +31,8 @@ def make_runner(rig: Rig, seed: int, observers: list[Observer]) -> LockstepRunne
     """
     if rig.laboratory is None:
         raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
-    table = rig.laboratory.model_extra or {}
     try:
-        laboratory = load_laboratory(rig.laboratory.entry_point, table, seed)
+        laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
     except ValueError as error:
         raise RigError(f"laboratory: {error}") from error
     journal, sequences = JournalWriter(), Sequences()
@@ -45,8 +44,8 @@ def seed_of(rig: Rig, seed: int | None) -> int:
     """The seed asked for, else the rig's, else ``DEFAULT_SEED``."""
     if seed is not None:
         return seed
-    extra = rig.laboratory.model_extra if rig.laboratory is not None else None
-    return int((extra or {}).get("seed", DEFAULT_SEED))
+    table = rig.laboratory.table if rig.laboratory is not None else {}
+    return int(table.get("seed", DEFAULT_SEED))
 
 
 class _LatencyReporter:

@@ -5,6 +5,7 @@ A ``PortTranslation`` is pure and serves both runners; what opens a real device 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 from drivers.laboratory import CameraFrame, CanFrame
 from groundstation.bus.topics import Delivery
@@ -22,7 +23,10 @@ class PortTranslation(ABC):
         vehicle: Whose it is, empty for what all vehicles share.
         address: Where the rig says it is opened.
         process: Name of the process that owns the edge.
+        reads: Class of the payloads that come in here.
     """
+
+    reads: ClassVar[type[Message]]
 
     channel: str
     vehicle: str
@@ -51,6 +55,8 @@ class PortTranslation(ABC):
 class ImuPort(PortTranslation):
     """Serial port of an IMU block."""
 
+    reads = m.ImuBytes
+
     baud: int
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
@@ -68,6 +74,8 @@ class ImuPort(PortTranslation):
 @dataclass(frozen=True)
 class StarCameraPort(PortTranslation):
     """A star camera: the stamp of a frame is the middle of its exposure."""
+
+    reads = m.StarImage
 
     delay_ns: int
     timeout_s: float
@@ -87,6 +95,8 @@ class StarCameraPort(PortTranslation):
 class FixStreamPort(PortTranslation):
     """An external pose stream whose poses serve as fixes."""
 
+    reads = m.FixBytes
+
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, bytes)
         return m.FixBytes(stamp_ns, self.vehicle, data)
@@ -96,6 +106,8 @@ class FixStreamPort(PortTranslation):
 class ReferencePort(PortTranslation):
     """Truth of the emulator, or motion capture."""
 
+    reads = m.ReferenceBytes
+
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, bytes)
         return m.ReferenceBytes(stamp_ns, self.vehicle, data)
@@ -104,6 +116,8 @@ class ReferencePort(PortTranslation):
 @dataclass(frozen=True)
 class ValveBusPort(PortTranslation):
     """The CAN bus all valve nodes share."""
+
+    reads = m.CanIn
 
     vehicles: tuple[str, ...]
 

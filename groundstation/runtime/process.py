@@ -5,6 +5,7 @@ means that nobody watches any more, and the process stops in good order, valves 
 """
 
 import json
+import os
 import signal
 import sys
 import threading
@@ -57,8 +58,11 @@ def stop_when_asked(stop: Callable[[], None]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: stop())
 
+    descriptor = sys.stdin.fileno()
+
     def watch() -> None:
-        sys.stdin.buffer.read()
+        while os.read(descriptor, 4096):  # unbuffered: a lock held here would hinder the exit
+            pass
         stop()
 
     threading.Thread(target=watch, name="launcher watch", daemon=True).start()

@@ -168,10 +168,21 @@ class NodeSection(_Section):
 
 
 class LaboratorySection(BaseModel):
-    """The emulated laboratory: an installed entry point; the other keys are its own."""
+    """The emulated laboratory: an installed entry point; the other keys are its own.
+
+    Attributes:
+        name: Of the entry point.
+        folder: Where its relative paths start; filled in when the rig is read.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True)
-    entry_point: str
+    name: str
+    folder: str = ""
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """What the laboratory is made from."""
+        return {"folder": self.folder, **(self.model_extra or {})}
 
 
 class Rig(_Section):
@@ -267,4 +278,7 @@ def _anchor(rig: Rig, folder: Path) -> Rig:
                 update={"camera": folder / camera.camera, "ceiling": folder / camera.ceiling}
             )
         mock_ups[name] = mock_up.model_copy(update={"star_camera": camera})
-    return rig.model_copy(update={"mock_ups": mock_ups})
+    laboratory = rig.laboratory
+    if laboratory is not None:
+        laboratory = laboratory.model_copy(update={"folder": str(folder.resolve())})
+    return rig.model_copy(update={"mock_ups": mock_ups, "laboratory": laboratory})
