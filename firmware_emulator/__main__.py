@@ -14,8 +14,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from firmware_emulator.devices.scene import SceneError
 from firmware_emulator.live.server import LiveLaboratory
+from firmware_emulator.sky.scene import SceneError
 
 
 class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from drivers.imu_block.protocol import V1_WIRE_BYTES, V2_WIRE_BYTES
 from drivers.valve_bus.protocol import MAX_VEHICLES, VALVES
+from firmware_emulator.devices.serial_line import ACTUAL_BAUD, BITS_PER_BYTE
 from firmware_emulator.faults import FaultConfig
 
 Pair = tuple[float, float]
@@ -147,7 +148,7 @@ class ImuConfig(Settings):
     @model_validator(mode="after")
     def _line_carries_the_frames(self) -> "ImuConfig":
         frame_bytes = V2_WIRE_BYTES if self.frame_version == 2 else V1_WIRE_BYTES
-        if 1000.0 / self.averaging * frame_bytes * 10.0 > 0.99 * self.baud:
+        if 1000.0 / self.averaging * frame_bytes * BITS_PER_BYTE > ACTUAL_BAUD[self.baud]:
             raise ValueError(
                 f"averaging = {self.averaging} makes {1000 / self.averaging:.0f} frames/s, "
                 f"more than {self.baud} Bd carry"

@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.laboratory import Arrival, CameraFrame, CanFrame, ChannelKind
 from firmware_emulator.config import LaboratoryConfig
-from firmware_emulator.devices.scene import SceneRenderer
+from firmware_emulator.devices.sky_renderer import SkyRenderer
 from firmware_emulator.devices.star_camera import Exposure, Renderer
 from firmware_emulator.devices.valve_bus import ValveBus
 from firmware_emulator.faults import Faults
@@ -168,7 +168,7 @@ class EmulatedLaboratory:
         for index, vehicle in enumerate(self.config.vehicles):
             camera = vehicle.camera
             if camera.source == "rendered":
-                renderers[vehicle.name] = SceneRenderer.load(
+                renderers[vehicle.name] = SkyRenderer.load(
                     self.config.path(camera.ceiling),
                     self.config.path(camera.camera),
                     Shutter(camera.exposure_s, camera.readout_s),

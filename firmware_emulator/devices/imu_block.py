@@ -44,7 +44,7 @@ from firmware_emulator.plant.motion_state import Felt, PollGrid
 from firmware_emulator.plant.rigid_body import Vehicle
 
 GYRO_START_NS = 35_000_000  # ADIS16100 data sheet
-POLL_READ_NS = 394_000  # of each tick, for gyro and four tilt channels over SPI; measured on the firmware
+FRAME_DELAY_NS = 500_000  # from the tick's edge to the first start bit: 0.39 ms of SPI, then arithmetic
 TRANSMITTER_UP_NS = 1_000_000
 GARBAGE = b"\xf8"  # a rising pin read as a start bit
 FIRMWARE = (1, 0)
@@ -98,7 +98,8 @@ class ImuBlock:
     ) -> None:
         self.line = line
         self._vehicle, self._grid, self._sensors = vehicle, grid, sensors
-        self._version, self._averaging, self._window = frame_version, averaging, averaging
+        self._version, self._own_averaging = frame_version, averaging
+        self._averaging = self._window = averaging
         self._serial_number = serial_number
         self._warm_up, self._faults, self._rng = warm_up, faults, rng
         self._is_faulty = faults.has("stuck_gyro") or faults.has("dead_tilt")
@@ -111,7 +112,6 @@ class ImuBlock:
         self._boot_poll = 0
         self._window_end = averaging
         self._frames = 0
-        self.frames_skipped = 0  # for want of room on the line, when averaging was set too short
         self._reset_cause = Status.RESET_POWER_ON
         self._frame_ns = grid.stamp_ns(averaging)
         line.send(start_ns + TRANSMITTER_UP_NS, GARBAGE)
@@ -124,7 +124,7 @@ class ImuBlock:
     @property
     def next_output_ns(self) -> int:
         """Earliest stamp at which bytes may reach the host."""
-        first_send_ns = self._frame_ns + POLL_READ_NS
+        first_send_ns = self._frame_ns + FRAME_DELAY_NS
         if self._inbox:
             return self.line.next_arrival_ns(min(first_send_ns, self._inbox[0][0]), PACKET_BYTES, 0)
         wire_bytes = V1_WIRE_BYTES if self._version == 1 else V2_WIRE_BYTES
@@ -173,10 +173,7 @@ class ImuBlock:
                 housekeeping=self._housekeeping(temperature_c, status),
                 attention=bool(status & _ATTENTION),
             )
-        if self.line.free_ns <= stamp_ns + round(self._window * self._grid.period_ns):
-            self.line.send(stamp_ns + POLL_READ_NS, frame)
-        else:
-            self.frames_skipped += 1
+        self.line.send(stamp_ns + FRAME_DELAY_NS, frame)
         self._begin_window(self._window_end)
 
     def _begin_window(self, last_poll: int) -> None:
@@ -223,7 +220,7 @@ class ImuBlock:
         return status
 
     def _housekeeping(self, temperature_c: float, status: Status) -> tuple[int, int]:
-        item = (self._frames - 1) % _HOUSEKEEPING_ITEMS
+        item = (self._window_end - self._boot_poll) // self._window % _HOUSEKEEPING_ITEMS
         if item == _HOUSEKEEPING_ITEMS - 1:
             return item, int(status) | (self._refused & 0xFF) << 8
         if item == 0:
@@ -241,6 +238,9 @@ class ImuBlock:
             case BadCommand(tag, kind, result):
                 self._refused += 1
                 reply = Ack(tag, kind, result)
+            case SetAveraging(tag, sample_count) if not self._fits_line(sample_count):
+                self._refused += 1
+                reply = Ack(tag, _COMMAND_TYPE[SetAveraging], AckResult.BAD_ARGUMENT)
             case SetAveraging(tag, sample_count):
                 self._averaging = sample_count  # the window under way keeps its length and its count
                 reply = Ack(tag, _COMMAND_TYPE[SetAveraging], AckResult.DONE)
@@ -249,15 +249,19 @@ class ImuBlock:
                 reply = Ack(tag, _COMMAND_TYPE[SelfTest], AckResult.DONE)
             case Reset(tag):
                 reply = Ack(tag, _COMMAND_TYPE[Reset], AckResult.DONE)
-        sent_ns = self.line.send(stamp_ns + POLL_READ_NS, encode_reply(reply))
+        sent_ns = self.line.send(stamp_ns + FRAME_DELAY_NS, encode_reply(reply))
         if isinstance(command, Reset):
             self._restart(sent_ns)
+
+    def _fits_line(self, sample_count: int) -> bool:
+        return V2_WIRE_BYTES * self.line.byte_ns <= sample_count * self._grid.period_ns
 
     def _restart(self, stamp_ns: int) -> None:
         """Back to the first line of the firmware; polls until the gyro may be trusted are lost."""
         self._boot_poll = self._grid.last_poll(stamp_ns + GYRO_START_NS)
         self._self_test = (SelfTestChannel(0), 0)
         self._frames, self._refused = 0, 0
+        self._averaging = self._own_averaging
         self._reset_cause = Status.RESET_WATCHDOG
         self._commands = CommandParser()
         self.line.send(stamp_ns + TRANSMITTER_UP_NS, GARBAGE)

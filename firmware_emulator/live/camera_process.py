@@ -19,9 +19,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_emulator.devices.scene import SceneError, SceneRenderer
+from firmware_emulator.devices.sky_renderer import SkyRenderer
 from firmware_emulator.devices.star_camera import Exposure, Renderer
 from firmware_emulator.live.tcp_server import LOOPBACK
+from firmware_emulator.sky.scene import SceneError
 from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
@@ -131,7 +132,7 @@ def main() -> int:
     cameras: dict[str, LiveCamera] = {}
     try:
         for row in json.loads(sys.stdin.readline()):
-            renderer = SceneRenderer.load(
+            renderer = SkyRenderer.load(
                 row["ceiling"],
                 row["camera"],
                 Shutter(row["exposure_s"], row["readout_s"]),

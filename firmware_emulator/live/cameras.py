@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
-from firmware_emulator.devices.scene import SceneError
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.live.tcp_server import LOOPBACK
+from firmware_emulator.sky.scene import SceneError
 
 _GRACE_S = 0.5
 
