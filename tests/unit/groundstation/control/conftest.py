@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from groundstation.control.allocation import Allocator
+from groundstation.control.averaging import RateMean
 from groundstation.control.controller import NO_NEIGHBOURS, Controller
 from groundstation.control.modulation import PulseConfig, PulseModulator
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
@@ -116,10 +117,15 @@ def fly(
     start_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     pulse: PulseConfig = PulseConfig(),  # noqa: B008  frozen
     update_s: float = 0.02,
+    averaged: bool = False,
     vehicle: VehicleModel | None = None,
     neighbours: Callable[[float], dict[str, ControlState]] | None = None,
 ) -> Flight:
-    """Close the loop for a while; truth integrates in 1 ms steps."""
+    """Close the loop for a while; truth integrates in 1 ms steps.
+
+    The controller is updated each `update_s`, or, if `averaged`, once a pulse period with the mean of the
+    rates that came each `update_s`.
+    """
     rng = np.random.default_rng(seed)
     vehicle = vehicle or VehicleModel(11.0, 0.25, square_of_eight())
     modulator = PulseModulator(Allocator(vehicle), pulse)
@@ -133,18 +139,25 @@ def fly(
     late_steps = round(world.latency_s / STEP_S)
     poses, speeds = np.tile(pose, (late_steps + 1, 1)), np.tile(velocity, (late_steps + 1, 1))
     close_at_s = np.full(len(vehicle.valves), -1.0)  # from the start of the period
+    rate_mean = RateMean()
     flight, wrench, pulses = Flight(), NO_WRENCH, None
     for count in range(round(duration_s / pulse.period_s)):
         now_s = count * pulse.period_s
-        for update in range(round(pulse.period_s / update_s)):
+        updates = round(pulse.period_s / update_s)
+        for update in range(updates):
             # the updates since the last pulses, the newest last; each reads a state of `latency_s` ago
             back_s = pulse.period_s - (update + 1) * update_s
             estimator.advance(now_s - back_s, round(update_s / STEP_S))
             row = max(0, len(poses) - 1 - late_steps - round(back_s / STEP_S))
+            rate_mean.add(estimator.state(now_s - back_s, poses[row], speeds[row]))
+            if update + 1 < updates and averaged:
+                continue
+            state = rate_mean.take()
+            assert state is not None
             wrench = controller.update(
-                estimator.state(now_s - back_s, poses[row], speeds[row]),
+                state,
                 goal,
-                update_s,
+                pulse.period_s if averaged else update_s,
                 applied=pulses.delivered if pulses else NO_WRENCH,
                 neighbours=neighbours(now_s - back_s) if neighbours else NO_NEIGHBOURS,
             )

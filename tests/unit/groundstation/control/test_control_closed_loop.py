@@ -68,6 +68,14 @@ def test_other_pulse_periods_hold_as_well(fly, vehicle, period_s):
     assert flight.errors(HERE, SETTLED_S)[0] < 0.006
 
 
+def test_one_update_a_period_is_enough_if_the_rates_between_are_averaged(fly, vehicle):
+    arguments = {"duration_s": 90.0, "start": (0.0, 0.0, 0.3)}
+    averaged = fly(station(vehicle), HERE, averaged=True, update_s=0.01, **arguments).errors(HERE, SETTLED_S)
+    sampled = fly(station(vehicle), HERE, update_s=0.1, **arguments).errors(HERE, SETTLED_S)
+    assert averaged[0] < 0.006
+    assert averaged[1] < 0.75 * sampled[1]
+
+
 @pytest.mark.parametrize("slope_m_s2", [0.0, 0.005, 0.008])
 def test_slopes_up_to_what_is_believed_are_held(fly, vehicle, world, slope_m_s2):
     tilted = world(slope_table_m_s2=(-slope_m_s2, slope_m_s2 / 2))

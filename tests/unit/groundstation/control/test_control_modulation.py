@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -50,6 +50,7 @@ def test_no_pulse_is_shorter_than_a_valve_can_give_or_longer_than_the_wire_can_s
     st.floats(-0.02, 0.02),
     st.sampled_from([0.06, 0.1]),
 )
+@settings(max_examples=30)
 def test_on_average_the_demand_is_delivered(force, torque, period_s):
     modulator = PulseModulator(ALLOCATOR, PulseConfig(period_s=period_s))
     demand, periods = Wrench(force, torque), 200

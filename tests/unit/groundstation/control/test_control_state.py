@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from groundstation.control.averaging import RateMean
 from groundstation.control.state import ControlState, Goal, Wrench, limit_length, rotate
 
 finite = st.floats(-1e6, 1e6)
@@ -35,6 +36,26 @@ def test_nothing_that_is_not_a_number_enters_or_leaves_a_controller(bad):
         Goal((0.0, bad), 0.0)
     with pytest.raises(ValueError, match="wrench must be finite"):
         Wrench((0.0, 0.0), bad)
+
+
+def test_the_mean_rate_goes_with_the_newest_pose():
+    mean = RateMean()
+    assert mean.take() is None
+    for count in range(1, 4):
+        mean.add(ControlState((float(count), 0.0), (0.0, 0.0), 0.0, 0.1 * count))
+    taken = mean.take()
+    assert taken.position_table_m == (3.0, 0.0)
+    assert taken.rate_rad_s == pytest.approx(0.2)
+    # nothing new: the last state as it came
+    assert mean.take().rate_rad_s == pytest.approx(0.3)
+
+
+def test_a_late_state_is_carried_to_the_present_by_coasting():
+    late = ControlState((1.0, 2.0), (0.1, -0.2), 0.5, 0.3)
+    now = late.carried(0.5)
+    assert now.position_table_m == pytest.approx((1.05, 1.9))
+    assert now.heading_rad == pytest.approx(0.65)
+    assert now.velocity_table_m_s == late.velocity_table_m_s
 
 
 def test_the_largest_numbers_are_numbers():
