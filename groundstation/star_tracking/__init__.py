@@ -1,0 +1,16 @@
+"""Star tracking: pictures of a ceiling of LEDs in, table poses with true covariance out.
+
+Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O, no messages.
+
+=============  =========================================================================================
+``detection``   picture -> spots with sub-pixel centres and their covariance
+``rays``        pixel -> point of the ceiling plane relative to the body (full camera model)
+``sky_index``   catalogue -> tables for constant-time look-ups of stars, triangles and pairs
+``tracker``     spots -> ``StarFix`` or ``NoFix``, lost in space or from a prior
+``published``   the published Delaunay method, for comparison
+=============  =========================================================================================
+
+Frames: pixel (u right, v down, (0, 0) the centre of the top-left pixel), ``body``, ``table``; ceiling
+coordinates are table x, y carried straight up. A pose is the body origin (x, y) in the table and the
+heading, counter-clockwise from table +x to body +x, at the middle of the exposure.
+"""

@@ -1,0 +1,116 @@
+"""Pose from matched stars: robust weighted least squares with a covariance that is true.
+
+The unknowns are a small motion (dx, dy, dheading) of the body in its own axes. Spot and star differ by
+``e = R(-heading) (star - position) - q``, whose covariance is the spot's, carried to the ceiling by the
+camera's Jacobian, plus the star's own; it does not depend on the heading as long as stars are known
+alike along both axes, so that all weights are made once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.star_tracking.rays import CeilingPoints
+
+Complex = NDArray[np.complex128]
+Array = NDArray[np.float64]
+
+_PRIOR_FREEDOM = 6.0  # a-priori sigmas count like this many residuals when the scale is judged
+_CLIP_SIGMAS = 3.0  # of the robust scale; a few bad centres would otherwise rule the error
+_STEPS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """A refined pose.
+
+    Attributes:
+        turn: exp(i heading).
+        shift_m: Body origin x + iy in the table.
+        cov: Covariance (3, 3) of (x, y, heading), table axes.
+        kept: Which of the matches were used, shape (n,).
+        scale: Ratio of found to expected residuals (sigma, not variance).
+    """
+
+    turn: complex
+    shift_m: complex
+    cov: Array
+    kept: NDArray[np.bool_]
+    scale: float
+
+
+def spot_covariance(points: CeilingPoints, cov_px2: Array) -> Array:
+    """Carry pixel covariances (n, 3: uu, uv, vv) to the ceiling, shape (n, 2, 2), m^2."""
+    pixel = np.empty((len(cov_px2), 2, 2))
+    pixel[:, 0, 0], pixel[:, 1, 1] = cov_px2[:, 0], cov_px2[:, 2]
+    pixel[:, 0, 1] = pixel[:, 1, 0] = cov_px2[:, 1]
+    jacobian = points.jacobian_m_px
+    return np.asarray(jacobian @ pixel @ jacobian.transpose(0, 2, 1))
+
+
+def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shift_m: complex) -> Pose:
+    """Fit the pose to matches.
+
+    Args:
+        q_body_m: Spots on the ceiling, body axes, shape (n,).
+        star_m: Their stars, table, shape (n,).
+        cov_m2: Covariance of spot minus star, body axes, shape (n, 2, 2).
+        turn: First guess, exp(i heading).
+        shift_m: First guess of the body origin.
+    """
+    n = len(q_body_m)
+    weight = _inverse(cov_m2)
+    lever = np.zeros((n, 2, 3))
+    lever[:, 0, 0] = lever[:, 1, 1] = 1.0
+    lever[:, 0, 2], lever[:, 1, 2] = -q_body_m.imag, q_body_m.real
+    weighted = weight @ lever
+    normal = lever.transpose(0, 2, 1) @ weighted
+    kept = np.ones(n)
+    scale2 = 1.0
+    information = normal.sum(axis=0)
+    for _ in range(_STEPS):
+        error = np.conj(turn) * (star_m - shift_m) - q_body_m
+        e = np.stack((error.real, error.imag), axis=1)
+        gradient = np.einsum("nij,ni->nj", weighted, e)
+        information = np.tensordot(kept, normal, axes=1)
+        step = np.linalg.solve(information, kept @ gradient)
+        shift_m = shift_m + turn * complex(step[0], step[1])
+        turn = turn * np.exp(1j * step[2])
+        error = np.conj(turn) * (star_m - shift_m) - q_body_m
+        e = np.stack((error.real, error.imag), axis=1)
+        distance2 = np.einsum("ni,nij,nj->n", e, weight, e)
+        fresh, scale2 = _clip(distance2)
+        if np.array_equal(fresh, kept) and abs(step[2]) < 1e-7:
+            break
+        kept = fresh
+    information = np.tensordot(kept, normal, axes=1)
+    rotation = np.eye(3)
+    rotation[:2, :2] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
+    cov = rotation @ (np.linalg.inv(information) * scale2) @ rotation.T
+    return Pose(complex(turn), complex(shift_m), 0.5 * (cov + cov.T), kept > 0.5, float(np.sqrt(scale2)))
+
+
+def _clip(distance2: Array) -> tuple[Array, float]:
+    """Drop residuals beyond the clip of the robust scale; give the variance scale of the rest."""
+    n = len(distance2)
+    # Of three unknowns n stars keep 2n - 3 degrees of freedom: small samples look better than they are.
+    freedom = max(2.0 * n - 3.0, 1.0)
+    robust = float(np.median(distance2)) / 1.386 * (2.0 * n / freedom)
+    limit = _CLIP_SIGMAS**2 * max(robust, 0.5) * 1.3
+    kept = distance2 <= limit
+    if int(kept.sum()) < 3:
+        kept = distance2 <= np.sort(distance2)[min(2, n - 1)]
+    freedom = max(2.0 * float(kept.sum()) - 3.0, 0.0)
+    total = float(distance2[kept].sum())
+    return kept.astype(np.float64), (_PRIOR_FREEDOM + total) / (_PRIOR_FREEDOM + freedom)
+
+
+def _inverse(matrix: Array) -> Array:
+    """Invert symmetric 2x2 matrices, shape (n, 2, 2)."""
+    a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
+    inverse = np.empty_like(matrix)
+    determinant = a * c - b * b
+    inverse[:, 0, 0], inverse[:, 1, 1] = c / determinant, a / determinant
+    inverse[:, 0, 1] = inverse[:, 1, 0] = -b / determinant
+    return inverse
