@@ -73,29 +73,37 @@ class StarImage(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarSpots(Message):
-    """Spots of light found in one frame; stamp and vehicle are the frame's.
+    """Spots of light found in one frame, brightest first; stamp and vehicle are the frame's.
 
     Attributes:
         arrival_ns: When the frame reached the node that looked into it.
         u_px: Column of each centre, pixel (0, 0) is the centre of the top-left pixel.
         v_px: Row of each centre.
-        flux: Light above the background, in grey levels times pixels.
-        sigma_px: Standard deviation of the centre per axis.
+        flux_dn: Light above the background.
+        covariance_px2: uu, uv, vv of each centre, one after the other.
         elongation: Ratio of the spot's principal axes, 1 is round.
-        background: Median grey level of the frame.
-        noise: Standard deviation of the background in grey levels.
-        reason: Empty, or why the frame cannot be used.
+        streak_px: Motion streak du, dv of each spot, one after the other.
+        background_dn: Median grey level of the frame.
+        noise_dn: Standard deviation of the background.
+        hot_pixels: Groups dropped as hot pixels.
+        cut_by_edge: Spots dropped at the frame's edge.
+        flooded: More light than a sky of stars can have.
+        reason: Empty, or why the frame cannot be looked into.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarSpots"
     arrival_ns: I64
     u_px: Float32Array
     v_px: Float32Array
-    flux: Float32Array
-    sigma_px: Float32Array
+    flux_dn: Float32Array
+    covariance_px2: Float32Array
     elongation: Float32Array
-    background: F64
-    noise: F64
+    streak_px: Float32Array
+    background_dn: F64
+    noise_dn: F64
+    hot_pixels: U16
+    cut_by_edge: U16
+    flooded: Bool
     reason: Text
 
 
