@@ -13,6 +13,8 @@ The error of an estimate is true minus nominal, additive in every component.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,19 +73,48 @@ def move(P: Array, F: Array, Q: Array) -> None:
     P[:MOVING, :MOVING] = 0.5 * (corner + corner.T)
 
 
-def age(x: Array, P: Array, duration_s: float, travelled_m: float, noise: NoiseModel) -> None:
-    """Let biases walk and the local slope be forgotten with the distance travelled, in place.
+def reopened_variance() -> Array:
+    """Return upper limits (22,) of the variances with which a filter that lost itself begins again."""
+    sigma = np.full(SIZE, np.inf)
+    sigma[GYRO_BIAS] = 0.02
+    sigma[ACC_BIAS_X : ACC_BIAS_Y + 1] = 0.02
+    return sigma**2
 
-    The slope is a field over the table, not a process in time: a vehicle that hovers keeps what it learned.
-    """
+
+def age(P: Array, duration_s: float, noise: NoiseModel) -> None:
+    """Let the biases walk, in place."""
     P[GYRO_BIAS, GYRO_BIAS] += noise.gyro_bias_walk_rad_s_rts**2 * duration_s
     walked = noise.acc_bias_walk_m_s2_rts**2 * duration_s
     P[ACC_BIAS_X, ACC_BIAS_X] += walked
     P[ACC_BIAS_Y, ACC_BIAS_Y] += walked
-    keep = float(np.exp(-travelled_m / noise.waviness_length_m))
-    x[WAVE_X : WAVE_Y + 1] *= keep
-    P[WAVE_X : WAVE_Y + 1] *= keep
-    P[:, WAVE_X : WAVE_Y + 1] *= keep
+
+
+def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> None:
+    """Let what is known of the local slope fade with the distance from where it was learned, in place.
+
+    The slope is a smooth field over the table, not a process in time: a vehicle that hovers keeps what it
+    learned, one that travels loses it as exp(-d^2 / 2 l^2). The law of a smooth field is no Markov chain, so
+    the distance counts from an anchor that is dropped anew after each length l; the result does not depend on
+    how often this is called.
+
+    Args:
+        x: (22,) nominal state where the vehicle is now.
+        P: (22, 22) its covariance.
+        anchor_m: (3,) x, y of the anchor and the largest distance from it so far; updated.
+        noise: sigma and length of the waviness.
+    """
+    length = noise.waviness_length_m
+    away = math.hypot(x[PX] - anchor_m[0], x[PY] - anchor_m[1])
+    if away <= anchor_m[2]:
+        return
+    keep = math.exp(-0.5 * (away**2 - anchor_m[2] ** 2) / length**2)
+    anchor_m[2] = away
+    if away > length:
+        anchor_m[:] = x[PX], x[PY], 0.0
+    wave = slice(WAVE_X, WAVE_Y + 1)
+    x[wave] *= keep
+    P[wave] *= keep
+    P[:, wave] *= keep
     fresh = noise.waviness_sigma_m_s2**2 * (1.0 - keep * keep)
     P[WAVE_X, WAVE_X] += fresh
     P[WAVE_Y, WAVE_Y] += fresh

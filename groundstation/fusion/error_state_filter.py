@@ -26,6 +26,12 @@ REOPENED_VELOCITY_M_S = 0.1
 MAX_AHEAD_S = 1.0
 """A fix whose exposure is further ahead of the packets has a wrong stamp."""
 WAITS = "waits for packets"
+CANDIDATE = "waits for a second fix"
+CANDIDATE_AGE_S = 5.0
+"""A first fix is compared with those up to this long after it."""
+MAX_SPEED_M_S = 0.2
+"""Nothing on a table flies faster; bounds what two first fixes may differ by."""
+AGREEMENT_SIGMAS = 6.0
 
 
 class ErrorStateFilter:
@@ -42,9 +48,10 @@ class ErrorStateFilter:
         """(22,) nominal state at the checkpoint."""
         self.P = np.diag(es.initial_variance(noise))
         """(22, 22) covariance there."""
+        self._anchor = np.zeros(3)
         self._reckoner = Reckoner(noise, self.counters)
         self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
-        self._confirmed = False
+        self._candidates: list[Fix] = []
         self._rests: list[tuple[float, float]] = []
         self._refused: list[tuple[float, Array]] = []
         self._waiting: list[Fix] = []
@@ -121,13 +128,14 @@ class ErrorStateFilter:
                 return self._refuse(fix, "more than a second ahead of the packets")
             return FixAccount(fix.t_exposure_ns, False, WAITS, math.nan, math.nan, math.nan, math.nan)
         if not reckoner.has_pose:
-            return self._start(fix, t, "starts the estimate", np.full(3, math.nan))
+            return self._consider(fix, t)
         if t <= reckoner.checkpoint_s:
             return self._refuse(fix, "older than the last used")
         x, P = self.x.copy(), self.P.copy()
-        self._propagate(x, P, reckoner.checkpoint_s, t)
-        z, H = measurements.predict_fix(fix, x, self._omega_read_at(t), self.noise)
-        S = H @ P @ H.T + fix.cov
+        anchor = self._propagate(x, P, reckoner.checkpoint_s, t)
+        omega_read = self._reckoner.history.omega_at(t)
+        z, H = measurements.predict_fix(fix, x, omega_read, self.noise)
+        S = H @ P @ H.T + measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
         weight = np.linalg.inv(S)
         nis = float(z @ weight @ z)
         if nis > self.noise.gate_nis:
@@ -135,16 +143,9 @@ class ErrorStateFilter:
         K = P @ H.T @ weight
         x += K @ z
         P -= K @ S @ K.T
-        self._confirmed = True
         reckoner.is_lost = False
-        self._accept(t, x, P)
+        self._accept(t, x, P, anchor)
         return FixAccount(fix.t_exposure_ns, True, "used", float(z[0]), float(z[1]), float(z[2]), nis)
-
-    def _omega_read_at(self, t_s: float) -> float:
-        if self.noise.gyro_lag_s == 0.0:
-            return 0.0
-        read = self._reckoner.history.between(t_s - self.noise.packet_period_s, t_s).omega_rad_s
-        return float(read.mean()) if len(read) else float(self.x[es.GYRO_BIAS])
 
     def _refuse(self, fix: Fix, reason: str) -> FixAccount:
         self.counters.add("fix_" + reason.replace(" ", "_"))
@@ -152,14 +153,12 @@ class ErrorStateFilter:
 
     def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
         """Refuse a fix, or believe it when those before it said the same."""
-        if not self._confirmed:
-            return self._start(fix, t, "contradicts an unconfirmed start", z)
         self.counters.add("fix_outside_the_gate")
         self._refused.append((t, z))
         if len(self._refused) >= self.noise.reopen_after:
             self._reckoner.is_lost = True
             if self._refused_agree():
-                return self._start(fix, t, "starts the estimate again", z)
+                return self._restart(fix, t, z, nis)
         return FixAccount(
             fix.t_exposure_ns, False, "outside the gate", float(z[0]), float(z[1]), float(z[2]), nis
         )
@@ -175,45 +174,100 @@ class ErrorStateFilter:
         sigma = np.array([self.noise.star_sigma_xy_m] * 2 + [self.noise.star_sigma_heading_rad])
         return bool((left < 6.0 * sigma + 0.02 * np.abs(z).max(axis=0)).all())
 
-    def _start(self, fix: Fix, t: float, reason: str, z: Array) -> FixAccount:
-        """Take the pose from this fix alone."""
-        x, P = self.x.copy(), self.P.copy()
-        rest_from = next((a for a, b in self._rests if a <= t <= b), None)
-        sigma = REOPENED_VELOCITY_M_S if rest_from is None else measurements.REST_VELOCITY_M_S
-        measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
-        if rest_from is not None and not self._reckoner.has_pose:
-            self._learn(x, P, rest_from, t)
-        self._reckoner.has_pose = True
-        self._reckoner.is_lost = True
-        self._confirmed = False
-        self._accept(t, x, P)
-        self.counters.add("fix_" + reason.replace(" ", "_"))
-        return FixAccount(fix.t_exposure_ns, True, reason, float(z[0]), float(z[1]), float(z[2]), math.nan)
+    def _consider(self, fix: Fix, t: float) -> FixAccount:
+        """Start from the first two fixes that agree; one alone may be wrong."""
+        nan = math.nan
+        for first in reversed(self._candidates):
+            if self._agree(first, fix):
+                self._start(first)
+                for other in self._candidates:
+                    used = other is first
+                    reason = "starts the estimate" if used else "no second fix agreed"
+                    self._accounts.append(FixAccount(other.t_exposure_ns, used, reason, nan, nan, nan, nan))
+                self._candidates.clear()
+                return self._judge(fix)
+        limit_ns = fix.t_exposure_ns - int(CANDIDATE_AGE_S * 1e9)
+        for old in [c for c in self._candidates if c.t_exposure_ns < limit_ns]:
+            self._accounts.append(
+                FixAccount(old.t_exposure_ns, False, "no second fix agreed", nan, nan, nan, nan)
+            )
+            self._candidates.remove(old)
+        self._candidates.append(fix)
+        return FixAccount(fix.t_exposure_ns, False, CANDIDATE, nan, nan, nan, nan)
 
-    def _accept(self, t: float, x: Array, P: Array) -> None:
+    def _agree(self, first: Fix, second: Fix) -> bool:
+        """Whether one vehicle may have been seen at both poses."""
+        a, b = self._seconds(first.t_exposure_ns), self._seconds(second.t_exposure_ns)
+        if not 0.0 < b - a < CANDIDATE_AGE_S:
+            return False
+        sigma = np.sqrt(np.diag(first.cov) + np.diag(second.cov))
+        slack = AGREEMENT_SIGMAS * sigma
+        turned = 0.0
+        if self._rest_of(a) is None or self._rest_of(b) is None:
+            segment = self._reckoner.history.between(a, b)
+            turned = float(((segment.omega_rad_s - self.x[es.GYRO_BIAS]) * segment.span_s).sum())
+            slack[:2] += MAX_SPEED_M_S * (b - a)
+            slack[2] += 3.0 * math.sqrt(self.P[es.GYRO_BIAS, es.GYRO_BIAS]) * (b - a)
+        off = [
+            second.x_m - first.x_m,
+            second.y_m - first.y_m,
+            math.remainder(second.heading_rad - first.heading_rad - turned, math.tau),
+        ]
+        return bool((np.abs(off) < slack).all())
+
+    def _rest_of(self, t: float) -> tuple[float, float] | None:
+        return next((rest for rest in self._rests if rest[0] <= t <= rest[1]), None)
+
+    def _start(self, fix: Fix) -> None:
+        """Take the first pose, and what the rest so far has shown."""
+        x, P, t = self.x.copy(), self.P.copy(), self._seconds(fix.t_exposure_ns)
+        rest = self._rest_of(t)
+        sigma = REOPENED_VELOCITY_M_S if rest is None else measurements.REST_VELOCITY_M_S
+        measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
+        if rest is not None:
+            self._learn(x, P, rest[0], t)
+        self._reckoner.has_pose = True
+        self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
+        self.counters.add("fix_starts_the_estimate")
+
+    def _restart(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
+        """Take the pose from this fix; what made the filter wrong may sit in the biases, so they open too."""
+        x = self.x.copy()
+        P = np.diag(np.minimum(es.initial_variance(self.noise), es.reopened_variance()))
+        measurements.take_pose(fix, x, P, float(x[es.THETA]), REOPENED_VELOCITY_M_S)
+        self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
+        self.counters.add("fix_starts_the_estimate_again")
+        return FixAccount(
+            fix.t_exposure_ns, True, "starts the estimate again", float(z[0]), float(z[1]), float(z[2]), nis
+        )
+
+    def _accept(self, t: float, x: Array, P: Array, anchor: Array) -> None:
         """Make the corrected state at `t` the checkpoint and integrate from it to now."""
-        self.x, self.P = x, 0.5 * (P + P.T)
+        self.x, self.P, self._anchor = x, 0.5 * (P + P.T), anchor
         self._reckoner.checkpoint_s = t
         self._refused.clear()
         self._rests = [r for r in self._rests if r[1] > t]
         self._reckoner.history.forget_before(t)
         self._integrate_to_now()
 
-    def _propagate(self, x: Array, P: Array, start_s: float, stop_s: float) -> None:
-        """Carry x and P from `start_s` to `stop_s` in place, through flight and rest."""
+    def _propagate(self, x: Array, P: Array, start_s: float, stop_s: float) -> Array:
+        """Carry x and P from `start_s` to `stop_s` in place, through flight and rest; return the anchor."""
+        anchor = self._anchor.copy()
         for a, b, resting in self._stretches(start_s, stop_s):
             if resting:
                 measurements.stand(x, P)
                 self._learn(x, P, a, b)
-                es.age(x, P, b - a, 0.0, self.noise)
+                es.age(P, b - a, self.noise)
                 continue
             segment = self._reckoner.history.between(a, b)
             if len(segment.span_s):
                 flight = fly(x, segment, self._lag_difference_s)
                 es.move(P, transition(segment, flight), moving_noise(segment, flight, self.noise))
-                travelled = math.hypot(flight.moved[es.PX] - x[es.PX], flight.moved[es.PY] - x[es.PY])
                 x[: es.MOVING] = flight.moved
-                es.age(x, P, flight.duration_s, travelled, self.noise)
+                es.age(P, flight.duration_s, self.noise)
+                es.forget_wave(x, P, anchor, self.noise)
+
+        return anchor
 
     def _learn(self, x: Array, P: Array, start_s: float, stop_s: float) -> None:
         segment = self._reckoner.history.between(start_s, stop_s)

@@ -56,6 +56,12 @@ def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) 
     return z, H
 
 
+def fix_covariance(fix: Fix, x: Array, omega_rad_s: float, noise: NoiseModel) -> Array:
+    """Return the fix's covariance (3, 3) with what an exposure's uncertain stamp adds to a moving vehicle."""
+    moved = np.array([x[es.VX], x[es.VY], omega_rad_s]) * noise.fix_time_sigma_s
+    return np.asarray(fix.cov + np.outer(moved, moved))
+
+
 def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_sigma_m_s: float) -> None:
     """Set pose and velocity from one fix alone, in place; what is known of biases and table stays.
 

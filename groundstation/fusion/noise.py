@@ -23,6 +23,9 @@ class NoiseModel:
     star_sigma_xy_m: float
     star_sigma_heading_rad: float
 
+    fix_time_sigma_s: float = 1e-3
+    """Of an exposure's stamp against the packets' stamps; matters only in fast motion."""
+
     imu_offset_x_m: float = 0.0
     """Accelerometers from the centre of mass, body frame."""
     imu_offset_y_m: float = 0.0
@@ -41,12 +44,12 @@ class NoiseModel:
     acc_scale_sigma: float = 1e-2
     """Of the accelerometers' scale and of the angles between their axes and the body's."""
 
-    slope_sigma_m_s2: float = 5e-3
+    slope_sigma_m_s2: float = 3e-3
     """Mean tilt of the table as gravity along it (9.8 mm/s^2 per mrad)."""
-    waviness_sigma_m_s2: float = 2.5e-4
+    waviness_sigma_m_s2: float = 2.8e-4
     """Local departure from the mean slope."""
-    waviness_length_m: float = 0.25
-    """Distance after which the local slope has lost all but 1/e of its memory."""
+    waviness_length_m: float = 0.12
+    """Distance over which the local slope is nearly one number (of a Gaussian correlation)."""
 
     gyro_lag_s: float = 0.0
     """Time constant of the gyro's low-pass, 1 / (2 pi f)."""

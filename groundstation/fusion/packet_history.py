@@ -64,6 +64,13 @@ class PacketHistory:
         """Drop everything."""
         del self.rows[:]
 
+    def omega_at(self, t_s: float) -> float:
+        """Return the gyro's reading in the packet that covers `t_s`, or in the nearest one."""
+        n = len(self.rows) // COLUMNS
+        ends = np.frombuffer(self.rows)[::COLUMNS]
+        row = min(int(np.searchsorted(ends, t_s)), n - 1)
+        return self.rows[row * COLUMNS + 2]
+
     def between(self, start_s: float, stop_s: float) -> Segment:
         """Return a copy of the packets that cover `start_s` to `stop_s`, the outer two cut.
 

@@ -22,6 +22,8 @@ STAMP_GAIN = 0.02
 """Share of a stamp's difference from the ticks that is followed; smooths the jitter of the stamps."""
 MAX_STAMP_JITTER_S = 0.02
 """A stamp that is further from its tick than this is not jitter: the clock or the sensor jumped."""
+BACKWARD_PACKETS = 20
+"""Stamps in a row behind the newest one after which the clock, not the packets, is taken to have changed."""
 
 
 class Reckoner:
@@ -33,12 +35,12 @@ class Reckoner:
     """
 
     __slots__ = (
-        "_acc_lag", "_ax", "_ay", "_bax", "_bay", "_bg", "_counters", "_force_x", "_force_y", "_gx",
-        "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_mxx", "_mxy", "_myx", "_myy",
-        "_omega_read", "_period", "_px", "_py", "_reference_c", "_rx", "_ry", "_screen",
-        "_temperature_c", "_theta", "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "has_pose",
-        "history", "is_lost", "newest_ns", "newest_s", "omega_rad_s", "origin_ns", "rest_from_s",
-        "rest_to_s", "variance",
+        "_acc_lag", "_ax", "_ay", "_backward", "_backward_ns", "_bax", "_bay", "_bg", "_counters",
+        "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_mxx",
+        "_mxy", "_myx", "_myy", "_omega_read", "_period", "_px", "_py", "_reference_c", "_rx",
+        "_ry", "_screen", "_temperature_c", "_theta", "_vx", "_vy", "_warmth", "_x", "checkpoint_s",
+        "has_pose", "history", "is_lost", "newest_ns", "newest_s", "omega_rad_s", "origin_ns",
+        "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters) -> None:
@@ -61,6 +63,7 @@ class Reckoner:
         self.omega_rad_s = 0.0
         self._omega_read = self._ax = self._ay = 0.0
         self._force_x = self._force_y = 0.0
+        self._backward = self._backward_ns = 0
         self._warmth = 0.0
         self._temperature_c = self._reference_c = math.nan
         self._theta = self._vx = self._vy = self._px = self._py = 0.0
@@ -78,8 +81,7 @@ class Reckoner:
         t_ns, dt, omega, ax, ay, temperature_c = packet
         if self.origin_ns is None:
             self.start_clock(t_ns - round(dt * 1e9))
-        elif t_ns <= self.newest_ns:
-            self._counters.add("packet_stamp_not_after_the_last")
+        elif t_ns <= self.newest_ns and not self._clock_restarted(t_ns):
             return False
         t = self.newest_s + dt
         off = (t_ns - self.origin_ns) * 1e-9 - t  # type: ignore[operator]  # start_clock has set the origin
@@ -90,6 +92,7 @@ class Reckoner:
             t += off
             dt = t - self.newest_s
         self.newest_ns, self.newest_s = t_ns, t
+        self._backward = 0
         if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
             self._warm(temperature_c)
         hole = 0.0
@@ -110,6 +113,19 @@ class Reckoner:
             )
         self._omega_read, self._ax, self._ay = omega, ax, ay
         self._advance(t, dt, omega, ax, ay, hole)
+        return True
+
+    def _clock_restarted(self, t_ns: int) -> bool:
+        """Count a stamp that lies behind; many in a row are a clock that jumped back, and are followed."""
+        self._counters.add("packet_stamp_not_after_the_last")
+        self._backward += 1
+        if self._backward < BACKWARD_PACKETS or t_ns <= self._backward_ns:
+            self._backward_ns = t_ns
+            return False
+        missed = self._backward * self._period
+        self.origin_ns = t_ns - round((self.newest_s + missed) * 1e9)
+        self._counters.add("clock_jumped_back")
+        self._screen.forget()
         return True
 
     def _advance(self, t: float, dt: float, omega: float, ax: float, ay: float, hole: float) -> None:

@@ -1,0 +1,152 @@
+"""`groundstation fusion`: state estimates from packets and late star fixes in files."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from time import monotonic
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from groundstation.cli.errors import UsageError
+from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
+from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.registry import ESTIMATORS
+from groundstation.fusion.stamp_ticks import StampTicks
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+
+NS = 1e9
+ESTIMATE_HEADER = (
+    "t_s,x_m,y_m,heading_rad,vx_m_s,vy_m_s,omega_rad_s,bias_omega,bias_ax,bias_ay,"
+    "std_x_m,std_y_m,std_heading_rad\n"
+)
+FIXES_HEADER = "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis\n"
+PROGRESS_AFTER_S = 2.0
+
+
+@app.callback()
+def _root() -> None:
+    """State of a mock-up from its IMU and late star fixes.
+
+    Example: groundstation fusion run FOLDER --out estimate.csv
+    """
+
+
+@app.command()
+def run(
+    folder: Annotated[Path, typer.Argument(help="Folder with imu.csv, stars.csv and meta.json.")],
+    out: Annotated[Path, typer.Option(help="CSV to write, a row per packet; fixes.csv goes beside it.")],
+    method: Annotated[str, typer.Option(help=f"One of: {', '.join(ESTIMATORS)}.")] = "filter",
+) -> None:
+    """Estimate the motion in a data set; causal, as if it were live.
+
+    Example: groundstation fusion run samples/fusion/station --out estimate.csv
+    """
+    if method not in ESTIMATORS:
+        raise UsageError(f"--method must be one of {', '.join(ESTIMATORS)}, found {method!r}.")
+    data = read_folder(folder)
+    estimator = ESTIMATORS[method](data.noise)
+    states, accounts = estimate(data, estimator)
+    write_atomically(
+        {
+            out: _estimate_lines(data, states),
+            out.with_name("fixes.csv"): _fix_lines(accounts),
+        }
+    )
+    _summarise(states, accounts, estimator)
+
+
+def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:
+    """Feed a data set to an estimator in the order in which it arrived.
+
+    Returns:
+        A state (or None) for each packet, and the account of every fix in order of arrival.
+    """
+    period = data.noise.packet_period_s
+    ticks = StampTicks(period)
+    variance = [
+        data.noise.star_sigma_xy_m**2,
+        data.noise.star_sigma_xy_m**2,
+        data.noise.star_sigma_heading_rad**2,
+    ]
+    cov = np.diag(variance)
+    stars, next_fix = data.stars.tolist(), 0
+    accounts: list[FixAccount] = []
+    states: list[PlanarState | None] = []
+    resting = data.run_start_s > 0.0
+    if resting:
+        estimator.begin_rest(0)
+    began, progress = monotonic(), sys.stderr.isatty()
+    rows = data.imu.tolist()
+    for number, (t, omega, ax, ay, temperature) in enumerate(rows):
+        while next_fix < len(stars) and stars[next_fix][1] <= t:
+            accounts.append(_add_fix(estimator, stars[next_fix], cov))
+            next_fix += 1
+        if resting and t > data.run_start_s:
+            estimator.end_rest(round(data.run_start_s * NS))
+            resting = False
+        if t - t != 0.0:
+            estimator.counters.add("packet_stamp_not_finite")
+            states.append(None)
+            continue
+        packet = ImuPacket(round(t * NS), ticks.elapsed_s(t), omega, ax, ay, temperature)
+        states.append(estimator.add_imu(packet))
+        if progress and number % 20000 == 19999 and monotonic() - began > PROGRESS_AFTER_S:
+            sys.stderr.write(f"\r{100 * number // len(rows)} % ")
+    for row in stars[next_fix:]:
+        estimator.counters.add("fix_after_the_last_packet")
+        accounts.append(_refused(row, "arrived after the last packet"))
+    return states, _merge(accounts, estimator.settled())
+
+
+def _add_fix(estimator: Estimator, row: list[float], cov: np.ndarray) -> FixAccount:
+    exposure, arrival, x, y, heading = row
+    if exposure - exposure != 0.0:
+        estimator.counters.add("fix_stamp_not_finite")
+        return _refused([0.0, *row[1:]], "not finite")
+    return estimator.add_fix(Fix(round(exposure * NS), round(arrival * NS), x, y, heading, cov))
+
+
+def _refused(row: list[float], reason: str) -> FixAccount:
+    stamp = round(row[0] * NS) if math.isfinite(row[0]) else 0
+    return FixAccount(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
+
+
+def _merge(accounts: list[FixAccount], settled: list[FixAccount]) -> list[FixAccount]:
+    """Replace the account of a fix that waited by the one given when it was settled."""
+    later = {account.t_exposure_ns: account for account in settled}
+    return [
+        later.pop(account.t_exposure_ns, account) if account.reason.startswith("waits") else account
+        for account in accounts
+    ]
+
+
+def _estimate_lines(data: FusionFolder, states: list[PlanarState | None]) -> Iterator[str]:
+    yield ESTIMATE_HEADER
+    empty = ",nan" * 12 + "\n"
+    form = ",%.7f,%.7f,%.7f,%.7f,%.7f,%.7f,%.8f,%.8f,%.8f,%.7f,%.7f,%.8f\n"
+    for t, state in zip(data.imu[:, 0].tolist(), states, strict=True):
+        yield f"{t:.6f}" + (empty if state is None else form % state[1:13])
+
+
+def _fix_lines(accounts: list[FixAccount]) -> Iterator[str]:
+    yield FIXES_HEADER
+    for a in accounts:
+        yield (
+            f"{a.t_exposure_ns / NS:.6f},{int(a.used)},{a.reason},{a.innovation_x_m:.6f},"
+            f"{a.innovation_y_m:.6f},{a.innovation_heading_rad:.7f},{a.nis:.3f}\n"
+        )
+
+
+def _summarise(states: list[PlanarState | None], accounts: list[FixAccount], estimator: Estimator) -> None:
+    used = sum(account.used for account in accounts)
+    print(f"{len(states)} packets, {len(accounts)} fixes, {used} used.")
+    for name, count in sorted(estimator.counters.by_name.items()):
+        print(f"  {name.replace('_', ' ')}: {count}")
+    if states and states[-1] is not None and states[-1].is_lost:
+        print("  the estimate was lost at the end")

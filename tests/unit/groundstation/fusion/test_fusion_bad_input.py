@@ -1,0 +1,133 @@
+"""Whatever arrives, the filter survives it with a counter, and its state stays finite."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimator import Fix, ImuPacket
+from groundstation.fusion.stamp_ticks import StampTicks
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def flying(noise, fix_cov):
+    estimator = ErrorStateFilter(noise)
+    estimator.begin_rest(0)
+    for t in range(10, 3001, 10):
+        estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+        if t in (1000, 2000):
+            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_cov))
+    estimator.end_rest(3000 * MS)
+    return estimator
+
+
+def test_duplicated_and_older_packets_are_refused_and_counted(flying):
+    before = flying.state()
+    assert flying.add_imu(ImuPacket(3000 * MS, 0.01, 1.0, 1.0, 1.0, 25.0)) is None
+    assert flying.add_imu(ImuPacket(2990 * MS, 0.01, 1.0, 1.0, 1.0, 25.0)) is None
+    assert flying.counters.by_name["packet_stamp_not_after_the_last"] == 2
+    assert flying.state() == before
+
+
+def test_a_clock_that_jumped_back_for_good_is_followed(flying, fix_cov):
+    for t in range(100_010, 100_500, 10):
+        flying.add_imu(ImuPacket(t * MS - 99_000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    assert flying.counters.by_name["clock_jumped_back"] == 1
+    state = flying.state()
+    assert state.t_ns == 1490 * MS
+    assert flying.add_fix(Fix(1400 * MS, 1490 * MS, 0.001, 0.0, 0.0, fix_cov)).used
+
+
+def test_a_hole_is_bridged_and_widens_the_sigmas(flying):
+    narrow = flying.state().std_x_m
+    state = flying.add_imu(ImuPacket(3500 * MS, 0.5, 0.0, 0.0, 0.0, 25.0))
+    assert flying.counters.by_name["packet_hole"] == 1
+    assert state.std_x_m > narrow
+    assert math.hypot(state.x_m, state.y_m) < 0.01
+
+
+def test_ticks_that_contradict_the_stamps_are_counted_and_the_stamps_win(flying):
+    state = flying.add_imu(ImuPacket(4000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    assert flying.counters.by_name["packet_ticks_and_stamps_disagree"] == 1
+    assert state.t_ns == 4000 * MS
+
+
+def test_a_fix_before_the_first_packet_is_refused(noise, fix_cov):
+    estimator = ErrorStateFilter(noise)
+    assert estimator.add_fix(Fix(0, 0, 0.0, 0.0, 0.0, fix_cov)).reason == "before the first packet"
+    estimator.add_imu(ImuPacket(5000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    account = estimator.add_fix(Fix(100 * MS, 5000 * MS, 0.0, 0.0, 0.0, fix_cov))
+    assert account.reason == "before the first packet"
+    assert estimator.counters.by_name["fix_before_the_first_packet"] == 2
+
+
+def test_a_fix_out_of_order_is_refused(flying, fix_cov):
+    account = flying.add_fix(Fix(1000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_cov))
+    assert account.reason == "older than the last used"
+
+
+def test_a_fix_from_the_future_is_refused(flying, fix_cov):
+    account = flying.add_fix(Fix(9000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_cov))
+    assert account.reason == "more than a second ahead of the packets"
+
+
+def test_a_block_without_thermometer_is_fine(noise, fix_cov):
+    estimator = ErrorStateFilter(noise)
+    estimator.begin_rest(0)
+    for t in range(10, 3001, 10):
+        estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, math.nan))
+        if t in (1000, 2000):
+            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_cov))
+    assert np.isfinite(estimator.state()[1:13]).all()
+
+
+anything = st.floats(allow_nan=True, allow_infinity=True, width=32)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.integers(-200, 400), anything, anything, anything, anything, st.booleans()), max_size=40
+    )
+)
+def test_no_sequence_of_readings_makes_the_state_anything_but_finite(events):
+    from groundstation.fusion.noise import NoiseModel
+
+    noise = NoiseModel(
+        packet_period_s=0.01, gyro_density_rad_s_rthz=7e-5, acc_density_m_s2_rthz=6e-5,
+        star_sigma_xy_m=1e-3, star_sigma_heading_rad=8.7e-4,
+    )  # fmt: skip
+    cov = np.diag([1e-6, 1e-6, 7.6e-7])
+    estimator = ErrorStateFilter(noise)
+    estimator.begin_rest(0)
+    for t in range(10, 1501, 10):
+        estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    estimator.add_fix(Fix(300 * MS, 900 * MS, 0.0, 0.0, 0.0, cov))
+    estimator.add_fix(Fix(900 * MS, 1500 * MS, 0.0, 0.0, 0.0, cov))
+    estimator.end_rest(1500 * MS)
+    t = 1500
+    for step, a, b, c, d, is_fix in events:
+        t += step
+        if is_fix:
+            estimator.add_fix(Fix((t - 300) * MS, t * MS, a, b, c, cov))
+        else:
+            estimator.add_imu(ImuPacket(t * MS, max(step, 1) / 1000, a, b, c, d))
+    assert np.isfinite(estimator.state()[1:13]).all()
+    assert np.isfinite(estimator.covariance()).all()
+
+
+@given(st.lists(st.integers(1, 12), min_size=1, max_size=60), st.integers(0, 2**32 - 1))
+def test_ticks_are_recovered_from_jittering_stamps(windows, seed):
+    rng = np.random.default_rng(seed)
+    ticks = StampTicks(0.01)
+    ticks.elapsed_s(0.01)
+    k = 1
+    for n in windows:
+        k += n
+        stamp = 0.01 * k + float(np.clip(rng.normal(0.0, 3e-4), -1e-3, 1e-3))
+        assert ticks.elapsed_s(stamp) == pytest.approx(0.01 * n)

@@ -1,0 +1,134 @@
+"""`groundstation fusion run` as a user meets it: outputs, and one sentence for what is wrong."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from groundstation.cli.errors import UsageError
+from groundstation.cli.fusion import app
+
+
+@pytest.fixture
+def folder(make_folder, tmp_path):
+    source = make_folder(scenario="station", seed=41, duration_s=16.0, run_start_s=5.0)
+    return shutil.copytree(source, tmp_path / "data")
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(app, ["run", *map(str, arguments)])
+
+
+def refusal(*arguments: object) -> str:
+    result = run(*arguments)
+    assert isinstance(result.exception, UsageError), result.output
+    return str(result.exception)
+
+
+@pytest.mark.parametrize("method", ["filter", "reintegration"])
+def test_it_writes_a_row_per_packet_and_accounts_for_every_fix(folder, tmp_path, method):
+    result = run(folder, "--out", tmp_path / "estimate.csv", "--method", method)
+    assert result.exit_code == 0, result.output
+    estimate = np.genfromtxt(tmp_path / "estimate.csv", delimiter=",", names=True)
+    packets = np.genfromtxt(folder / "imu.csv", delimiter=",", names=True)
+    np.testing.assert_array_equal(estimate["t_s"], packets["t_s"])
+    header = (tmp_path / "estimate.csv").read_text().splitlines()[0].split(",")
+    assert header[-3:] == ["std_x_m", "std_y_m", "std_heading_rad"]
+    fixes = (tmp_path / "fixes.csv").read_text().splitlines()
+    assert fixes[0] == "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis"
+    assert len(fixes) == len((folder / "stars.csv").read_text().splitlines())
+    assert not any("waits" in line for line in fixes)
+
+
+def test_the_estimate_is_causal(folder, tmp_path):
+    run(folder, "--out", tmp_path / "whole.csv")
+    for name, column in (("imu.csv", 0), ("stars.csv", 1)):
+        lines = (folder / name).read_text().splitlines(keepends=True)
+        kept = [line for line in lines[1:] if float(line.split(",")[column]) <= 11.0]
+        (folder / name).write_text("".join([lines[0], *kept]))
+    run(folder, "--out", tmp_path / "cut.csv")
+    cut = (tmp_path / "cut.csv").read_text()
+    assert (tmp_path / "whole.csv").read_text().startswith(cut)
+
+
+def test_columns_may_stand_in_any_order(folder, tmp_path):
+    run(folder, "--out", tmp_path / "a.csv")
+    rows = [line.split(",")[::-1] for line in (folder / "stars.csv").read_text().splitlines()]
+    (folder / "stars.csv").write_text("".join(",".join(row) + "\n" for row in rows))
+    run(folder, "--out", tmp_path / "b.csv")
+    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
+
+
+@pytest.mark.parametrize("name", ["imu.csv", "stars.csv", "meta.json"])
+def test_a_missing_file_is_named(folder, tmp_path, name):
+    (folder / name).unlink()
+    assert f"{name} is missing" in refusal(folder, "--out", tmp_path / "e.csv")
+    assert not (tmp_path / "e.csv").exists()
+
+
+def test_a_missing_column_is_named(folder, tmp_path):
+    text = (folder / "imu.csv").read_text().replace("ay_m_s2", "ay")
+    (folder / "imu.csv").write_text(text)
+    assert "column ay_m_s2 is missing" in refusal(folder, "--out", tmp_path / "e.csv")
+
+
+def test_a_word_among_numbers_is_named_with_its_line(folder, tmp_path):
+    lines = (folder / "imu.csv").read_text().splitlines()
+    cells = lines[7].split(",")
+    lines[7] = ",".join([cells[0], "oops", *cells[2:]])
+    (folder / "imu.csv").write_text("\n".join(lines))
+    message = refusal(folder, "--out", tmp_path / "e.csv")
+    assert "line 8" in message
+    assert "omega_rad_s" in message
+    assert "oops" in message
+
+
+@pytest.mark.parametrize("content", ["", "t_s,omega_rad_s,ax_m_s2,ay_m_s2,temperature_C\n"])
+def test_an_empty_file_is_refused(folder, tmp_path, content):
+    (folder / "imu.csv").write_text(content)
+    assert "imu.csv" in refusal(folder, "--out", tmp_path / "e.csv")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("imu_rate_hz", None), ("imu_rate_hz", 0.0), ("imu_offset_m", [1.0]), ("acc_lsb_m_s2", "x")],
+)
+def test_a_wrong_key_is_named(folder, tmp_path, key, value):
+    meta = json.loads((folder / "meta.json").read_text())
+    meta["known"][key] = value
+    (folder / "meta.json").write_text(json.dumps(meta))
+    assert f"known.{key}" in refusal(folder, "--out", tmp_path / "e.csv")
+
+
+def test_meta_that_is_no_json_is_refused_with_its_line(folder, tmp_path):
+    (folder / "meta.json").write_text('{"known": {\n "a": 1,\n}')
+    assert "line 3" in refusal(folder, "--out", tmp_path / "e.csv")
+
+
+def test_only_the_known_block_is_read(folder, tmp_path):
+    run(folder, "--out", tmp_path / "a.csv")
+    meta = json.loads((folder / "meta.json").read_text())
+    (folder / "meta.json").write_text(json.dumps({"known": meta["known"]}))
+    run(folder, "--out", tmp_path / "b.csv")
+    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
+
+
+def test_an_unknown_method_and_an_unwritable_place_are_refused(folder, tmp_path):
+    assert "--method" in refusal(folder, "--out", tmp_path / "e.csv", "--method", "guess")
+    assert "cannot be written" in refusal(folder, "--out", tmp_path / "nowhere" / "e.csv")
+
+
+def test_shuffled_and_broken_rows_are_survived_and_counted(folder, tmp_path):
+    lines = (folder / "imu.csv").read_text().splitlines(keepends=True)
+    lines[500], lines[501] = lines[501], lines[500]
+    lines.insert(700, lines[699])
+    cells = lines[900].split(",")
+    lines[900] = ",".join([cells[0], "nan", *cells[2:]])
+    (folder / "imu.csv").write_text("".join(lines))
+    result = run(folder, "--out", tmp_path / "e.csv")
+    assert result.exit_code == 0
+    assert "packet stamp not after the last: 2" in result.output
+    assert "packet wild" in result.output
+    assert len((tmp_path / "e.csv").read_text().splitlines()) == len(lines)
