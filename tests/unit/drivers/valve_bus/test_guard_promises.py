@@ -169,6 +169,6 @@ class GuardedValves(RuleBasedStateMachine):
 
 
 GuardedValves.TestCase.settings = settings(
-    max_examples=120, stateful_step_count=25, deadline=None, derandomize=True
+    max_examples=80, stateful_step_count=25, deadline=None, derandomize=True
 )
 test_the_guard_keeps_its_promises_on_a_bad_day = GuardedValves.TestCase

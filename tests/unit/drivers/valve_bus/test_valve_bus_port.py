@@ -1,7 +1,7 @@
 import queue
 import socket
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import can
 import pytest
@@ -28,7 +28,8 @@ class Adapter:
     def _serve(self):
         self._client, _ = self._server.accept()
         self.connected.set()
-        with self._client.makefile("rb") as stream:
+        # After a hang-up the port's last lines meet a closed connection, and the reset may come back here.
+        with suppress(ConnectionResetError), self._client.makefile("rb") as stream:
             line = bytearray()
             while byte := stream.read(1):
                 if byte == b"\r":
@@ -152,17 +153,16 @@ def test_a_slcan_adapter_behind_a_socket_is_opened_used_and_left():
         assert decode(STATUS).is_armed
 
 
-@pytest.mark.parametrize(
-    "noise", [b"t18\r", b"tzzz1\r", b"\xff\xfe\xfd\r", b"t1819" + b"00" * 9 + b"\r", b"tFFF0\r"]
-)
-def test_noise_on_the_adapters_line_is_counted(noise):
+def test_noise_on_the_adapters_line_is_counted_and_costs_no_good_frame():
+    noises = (b"t18\r", b"tzzz1\r", b"\xff\xfe\xfd\r", b"t1819" + b"00" * 9 + b"\r", b"tFFF0\r")
     with slcan() as (port, adapter):
-        adapter.say(noise)
-        while not port.counters.garbled:
-            assert port.read(0.1) is None
-        adapter.say(b"t1816815399000802\r")
-        assert port.read(PATIENCE_S)[1] == STATUS
-        assert port.counters.garbled == 1
+        for count, noise in enumerate(noises, start=1):
+            adapter.say(noise)
+            while port.counters.garbled < count:
+                assert port.read(0.1) is None
+            adapter.say(b"t1816815399000802\r")
+            assert port.read(PATIENCE_S)[1] == STATUS
+            assert port.counters.garbled == count
 
 
 def test_an_adapter_that_hangs_up_is_a_lost_link():
