@@ -213,6 +213,18 @@ def test_a_clock_that_goes_back_stops(flying):
     assert flying.tick().open_mask == 1
 
 
+def test_a_clock_that_went_back_costs_no_valve_its_open_time():
+    source = Source(Guard(1, OpenTimeLimits(max_duty_ratio=0.5, duty_window_s=1.0)), start_ms=3_600_000)
+    source.tick()
+    source.tick(-3_600_000)
+    source.guard.release_stop(0)
+    source.guard.arm(0)
+    source.say()
+    source.say()
+    source.say(ONE)
+    assert source.tick().command.on_times_ms == ONE
+
+
 def test_no_valve_stays_open_longer_than_the_longest_run():
     source = Source(Guard(1, OpenTimeLimits(max_open_s=0.3, min_rest_s=0.02, max_duty_ratio=1.0)))
     source.say()
