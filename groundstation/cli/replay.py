@@ -27,6 +27,8 @@ app = typer.Typer(rich_markup_mode=None)
 
 _COUNTS = ("equal", "close", "different", "missing", "extra", "unrecorded")
 
+_WIDTH = 100  # on a pipe too: names are never cut
+
 
 @app.command()
 def replay(
@@ -101,8 +103,11 @@ def _factory(rig: Rig) -> Callable[[str], Node]:
 
 def _print_report(report: ReplayReport) -> None:
     console = Console()
+    console.width = max(console.width, _WIDTH)
     for reason in report.refused.values():
         print(reason)
+    if report.before_start:
+        print(f"{report.before_start} journal entries stand before the first start of their node: left out")
     for name, count in report.missing_inputs.items():
         print(f"{name}: {count} messages that the node consumed are not in the recording")
     table = Table(

@@ -70,6 +70,7 @@ class ReplayReport:
         results: Per topic and owner, in the order of the topic table.
         inputs: Messages handed to nodes.
         ticks: Ticks told to nodes.
+        before_start: Journal entries of nodes before their first recorded start: left out.
         missing_inputs: Messages a node had consumed that are not in the recording, by ``node <- topic``.
         config_crcs: Hash of configuration and calibration that each node started with then.
     """
@@ -79,6 +80,7 @@ class ReplayReport:
     results: list[TopicResult] = field(default_factory=list)
     inputs: int = 0
     ticks: int = 0
+    before_start: int = 0
     missing_inputs: dict[str, int] = field(default_factory=dict)
     config_crcs: dict[str, int] = field(default_factory=dict)
 

@@ -19,8 +19,8 @@ def test_a_message_laid_out_by_hand():
 
 def test_an_array_of_another_precision_is_refused():
     # it would replay as other numbers than the node next door was given
-    kinds = {"float32[]": np.zeros(2), "float64": 0.0, "int64": 0, "string": ""}
-    spots = m.StarSpots(0, "alpha", *(kinds[kind] for _, kind in ros_fields(m.StarSpots)))
+    kinds = {"float32[]": np.zeros(2), "string": ""}
+    spots = m.StarSpots(0, "alpha", *(kinds.get(kind, 0) for _, kind in ros_fields(m.StarSpots)))
     with pytest.raises(TypeError, match="u_px: expected float32, found float64"):
         Codec(m.StarSpots).encode(spots)
 

@@ -19,7 +19,7 @@ def envelope_of(payload, sequence, process, publish_ns):
 
 def spots(stamp_ns, vehicle, some):
     """Three spots; every array of the payload holds ``some``."""
-    empty = {"float32[]": some, "float64": 1.5, "int64": stamp_ns, "string": ""}
+    empty = {"float32[]": some, "float64": 1.5, "int64": stamp_ns, "uint16": 3, "bool": False, "string": ""}
     return m.StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(m.StarSpots)))
 
 

@@ -335,12 +335,25 @@ def test_a_recording_without_a_journal_is_refused(tmp_path):
         replay(tmp_path / "empty.mcap")
 
 
-def test_a_recording_that_begins_in_mid_flight_is_refused(tmp_path):
-    path = fly(tmp_path / "whole.mcap")
-    with Recording(path) as whole, Recorder(tmp_path / "half.mcap", RecordingInfo()) as half:
-        for r in whole.messages(start_ns=150_000_000):
-            half.record_encoded(r.envelope, r.data, r.log_ns)
-        for r in list(whole.messages([topic_of(m.Journal)]))[:1]:  # the start comes too late
-            half.record_encoded(r.envelope, r.data, whole.stop_ns)
-    with pytest.raises(UsageError, match="begins after the node had started"):
-        replay(Path(tmp_path / "half.mcap"))
+def begun_late(whole: Path, late: Path, start_ns: int) -> Path:
+    """What a recorder has that was started in mid-flight."""
+    with Recording(whole) as recording, Recorder(late, RecordingInfo()) as recorder:
+        for r in recording.messages(start_ns=start_ns):
+            recorder.record_encoded(r.envelope, r.data, r.log_ns)
+    return late
+
+
+def test_a_recording_that_begins_in_mid_flight_is_refused(tmp_path, path):
+    with pytest.raises(UsageError, match="no start of a node"):
+        replay(begun_late(path, tmp_path / "late.mcap", 150_000_000))
+
+
+def test_a_life_whose_start_was_not_recorded_is_left_out(tmp_path):
+    path = tmp_path / "twice.mcap"
+    with Recorder(path, RecordingInfo()) as recorder:
+        Laboratory(recorder).fly(40)
+        Laboratory(recorder).fly(60, begin=700)
+    report = replay(begun_late(path, tmp_path / "late.mcap", 150_000_000))
+    assert report.agrees
+    assert report.before_start > 100
+    assert counts(report) == ALL
