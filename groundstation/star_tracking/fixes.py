@@ -12,6 +12,7 @@ class Mode(StrEnum):
 
     LOST_IN_SPACE = "lost-in-space"
     TRACKING = "tracking"
+    PUBLISHED = "published"
 
 
 class Refusal(StrEnum):

@@ -1,0 +1,80 @@
+"""Files of the star-tracker commands: frames in, tables out; every refusal is one sentence."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.camera import CameraCalibration
+from groundstation.cli.errors import UsageError
+
+_ENDINGS = {".png": b"IEND\xaeB`\x82", ".jpg": b"\xff\xd9", ".jpeg": b"\xff\xd9"}
+_SUFFIXES = frozenset({*_ENDINGS, ".bmp", ".pgm", ".tif", ".tiff"})
+
+
+def find_frames(folder: Path, sub_folder: str = "frames") -> list[Path]:
+    """Give the pictures of a data set in the order of their names.
+
+    Raises:
+        UsageError: There is no such folder, or no picture in it.
+    """
+    frames = folder / sub_folder
+    if not frames.is_dir():
+        raise UsageError(f"{frames}: no such folder; expected the pictures there.")
+    found = sorted(p for p in frames.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
+    if not found:
+        raise UsageError(f"{frames}: holds no picture ({', '.join(sorted(_SUFFIXES))}).")
+    return found
+
+
+def read_frame(path: Path, camera: CameraCalibration) -> NDArray[np.uint8]:
+    """Read one grey 8-bit picture of the camera's size.
+
+    Raises:
+        UsageError: The file is empty, torn, no picture, in colour, not 8 bit, or of another size.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror or error}).") from error
+    if not data:
+        raise UsageError(f"{path}: is an empty file.")
+    ending = _ENDINGS.get(path.suffix.lower())
+    if ending is not None and ending not in data[-64:]:
+        raise UsageError(f"{path}: is cut short, its end marker is missing.")
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise UsageError(f"{path}: is no picture that can be decoded.")
+    if image.ndim != 2:
+        raise UsageError(f"{path}: has {image.shape[2]} colour channels, expected a grey picture.")
+    if image.dtype != np.uint8:
+        raise UsageError(f"{path}: has {8 * image.dtype.itemsize}-bit pixels, expected 8 bit.")
+    if image.shape != (camera.height, camera.width):
+        raise UsageError(
+            f"{path}: is {image.shape[1]} x {image.shape[0]} px, camera.json says "
+            f"{camera.width} x {camera.height}."
+        )
+    return np.asarray(image, dtype=np.uint8)
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a text file whole or not at all.
+
+    Raises:
+        UsageError: The folder does not exist or cannot be written.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror or error}).") from error
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except OSError as error:
+        Path(temporary).unlink(missing_ok=True)
+        raise UsageError(f"{path}: cannot be written ({error.strerror or error}).") from error

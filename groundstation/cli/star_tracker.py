@@ -1,0 +1,132 @@
+"""``groundstation star-tracker``: star fixes from frames in a folder, and the sky's calibrations."""
+
+import csv
+import io
+import math
+import time
+from collections.abc import Callable, Iterator
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
+from groundstation.cli.errors import UsageError
+from groundstation.cli.star_files import find_frames, read_frame, write_atomically
+from groundstation.star_tracking.detection import detect
+from groundstation.star_tracking.fixes import NoFix, StarFix
+from groundstation.star_tracking.published import PublishedTracker
+from groundstation.star_tracking.tracker import StarTracker
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Star fixes from pictures of a ceiling of LEDs."
+)
+
+COLUMNS = (
+    "frame",
+    "fix",
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "ms",
+    "stars",
+    "std_x_m",
+    "std_y_m",
+    "std_heading_rad",
+    "reason",
+)
+
+
+class Method(StrEnum):
+    """Which star identification."""
+
+    DEFAULT = "default"
+    PUBLISHED = "published"
+
+
+@app.callback()
+def _root() -> None:
+    """Star fixes from pictures of a ceiling of LEDs, and the calibrations of that sky."""
+
+
+@app.command()
+def solve(
+    folder: Annotated[Path, typer.Argument(help="With ceiling.csv, camera.json and frames/.")],
+    out: Annotated[Path, typer.Option(help="CSV to write, one row per frame.")],
+    method: Annotated[Method, typer.Option(help="Star identification.")] = Method.DEFAULT,
+) -> None:
+    """Solve every frame of a folder on its own, lost in space.
+
+    Example:
+      groundstation star-tracker solve recordings/ceiling --out answers.csv
+    """
+    cv2.setNumThreads(1)
+    camera, catalogue = load_sky(folder)
+    frames = find_frames(folder)
+    solver = _solver(method, camera, catalogue)
+    solver(np.zeros((camera.height, camera.width), np.uint8))  # the first call pays for lazy imports
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for path in _with_progress(frames, "solving"):
+        image = read_frame(path, camera)
+        begin = time.process_time()
+        answer = solver(image)
+        writer.writerow(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))
+    write_atomically(out, buffer.getvalue())
+
+
+def load_sky(folder: Path) -> tuple[CameraCalibration, StarCatalogue]:
+    """Read camera.json and ceiling.csv of a folder.
+
+    Raises:
+        UsageError: One of them is missing or wrong.
+    """
+    if not folder.is_dir():
+        raise UsageError(f"{folder}: no such folder.")
+    try:
+        return CameraCalibration.load(folder / "camera.json"), StarCatalogue.load(folder / "ceiling.csv")
+    except CalibrationFileError as error:
+        raise UsageError(str(error)) from error
+
+
+def _solver(
+    method: Method, camera: CameraCalibration, catalogue: StarCatalogue
+) -> Callable[[NDArray[np.uint8]], StarFix | NoFix]:
+    if method is Method.PUBLISHED:
+        published = PublishedTracker(catalogue, camera)
+        return lambda image: published.solve(detect(image))
+    tracker = StarTracker(catalogue, camera)
+    return lambda image: tracker.solve(detect(image))
+
+
+def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
+    if isinstance(answer, NoFix):
+        return [frame, "0", "", "", "", f"{ms:.3f}", "0", "", "", "", answer.reason.value]
+    pose = (answer.x_m, answer.y_m, answer.heading_rad)
+    spread = (answer.std_x_m, answer.std_y_m, answer.std_heading_rad)
+    if not all(math.isfinite(value) for value in (*pose, *spread)):
+        raise AssertionError(f"frame {frame}: the solver gave a fix that is not finite")
+    return [
+        frame,
+        "1",
+        *(f"{value:.7f}" for value in pose),
+        f"{ms:.3f}",
+        str(answer.stars),
+        *(f"{value:.3e}" for value in spread),
+        "",
+    ]
+
+
+def _with_progress(frames: list[Path], what: str) -> Iterator[Path]:
+    """Iterate with a progress bar on a terminal's stderr, silently elsewhere."""
+    console = Console(stderr=True)
+    yield from track(
+        frames, description=what, console=console, disable=not console.is_terminal, transient=True
+    )
