@@ -15,6 +15,7 @@ import typer
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
 from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.stamp_ticks import StampTicks
 
@@ -42,16 +43,22 @@ def run(
     folder: Annotated[Path, typer.Argument(help="Folder with imu.csv, stars.csv and meta.json.")],
     out: Annotated[Path, typer.Option(help="CSV to write, a row per packet; fixes.csv goes beside it.")],
     method: Annotated[str, typer.Option(help=f"One of: {', '.join(ESTIMATORS)}.")] = "filter",
+    smooth: Annotated[bool, typer.Option("--smooth", help="Look ahead as well: for recordings.")] = False,
 ) -> None:
-    """Estimate the motion in a data set; causal, as if it were live.
+    """Estimate the motion in a data set; causal, as if it were live, unless --smooth.
 
     Example: groundstation fusion run samples/fusion/station --out estimate.csv
     """
     if method not in ESTIMATORS:
         raise UsageError(f"--method must be one of {', '.join(ESTIMATORS)}, found {method!r}.")
+    if smooth and method != "filter":
+        raise UsageError(f"--smooth works on the filter, not on --method {method}.")
     data = read_folder(folder)
-    estimator = ESTIMATORS[method](data.noise)
+    estimator = OfflineSmoother(data.noise) if smooth else ESTIMATORS[method](data.noise)
     states, accounts = estimate(data, estimator)
+    if isinstance(estimator, OfflineSmoother):
+        later = iter(estimator.states())
+        states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0]]
     write_atomically(
         {
             out: _estimate_lines(data, states),

@@ -89,7 +89,15 @@ def age(P: Array, duration_s: float, noise: NoiseModel) -> None:
     P[ACC_BIAS_Y, ACC_BIAS_Y] += walked
 
 
-def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> None:
+def full_transition(rows: Array, keep: float) -> Array:
+    """Return the transition (22, 22) of a segment: five moving rows, a fading wave, constants."""
+    F = np.eye(SIZE)
+    F[:MOVING] = rows
+    F[WAVE_X, WAVE_X] = F[WAVE_Y, WAVE_Y] = keep
+    return F
+
+
+def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> float:
     """Let what is known of the local slope fade with the distance from where it was learned, in place.
 
     The slope is a smooth field over the table, not a process in time: a vehicle that hovers keeps what it
@@ -102,11 +110,14 @@ def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> None:
         P: (22, 22) its covariance.
         anchor_m: (3,) x, y of the anchor and the largest distance from it so far; updated.
         noise: sigma and length of the waviness.
+
+    Returns:
+        The share of it that was kept.
     """
     length = noise.waviness_length_m
     away = math.hypot(x[PX] - anchor_m[0], x[PY] - anchor_m[1])
     if away <= anchor_m[2]:
-        return
+        return 1.0
     keep = math.exp(-0.5 * (away**2 - anchor_m[2] ** 2) / length**2)
     anchor_m[2] = away
     if away > length:
@@ -118,3 +129,4 @@ def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> None:
     fresh = noise.waviness_sigma_m_s2**2 * (1.0 - keep * keep)
     P[WAVE_X, WAVE_X] += fresh
     P[WAVE_Y, WAVE_Y] += fresh
+    return keep

@@ -17,7 +17,9 @@ from groundstation.fusion import measurements
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.reckoner import Reckoner
+from groundstation.fusion.trace import Carried, Chain, Corrected, Trace
 
 STEP_S = 1.0
 """Longest stretch over which the local slope is held; an outage is covered in several."""
@@ -39,10 +41,12 @@ class ErrorStateFilter:
 
     Args:
         noise: sensors and table of this mock-up.
+        trace: where to write down every step for a smoother; all packets are then kept.
     """
 
-    def __init__(self, noise: NoiseModel) -> None:
+    def __init__(self, noise: NoiseModel, trace: Trace | None = None) -> None:
         self.noise = noise
+        self._trace = trace
         self.counters = Counters()
         self.x = es.initial_state(noise)
         """(22,) nominal state at the checkpoint."""
@@ -132,11 +136,12 @@ class ErrorStateFilter:
         if t <= reckoner.checkpoint_s:
             return self._refuse(fix, "older than the last used")
         x, P = self.x.copy(), self.P.copy()
-        anchor = self._propagate(x, P, reckoner.checkpoint_s, t)
+        steps: list[Carried | Corrected] = []
+        anchor = self._propagate(x, P, reckoner.checkpoint_s, t, steps)
         omega_read = self._reckoner.history.omega_at(t)
         z, H = measurements.predict_fix(fix, x, omega_read, self.noise)
         S = H @ P @ H.T + measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
-        weight = np.linalg.inv(S)
+        weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
         nis = float(z @ weight @ z)
         if nis > self.noise.gate_nis:
             return self._contradicted(fix, t, z, nis)
@@ -144,6 +149,8 @@ class ErrorStateFilter:
         x += K @ z
         P -= K @ S @ K.T
         reckoner.is_lost = False
+        if self._trace is not None:
+            self._trace.chains[-1].steps += [*steps, Corrected(H, K, weight, z)]
         self._accept(t, x, P, anchor)
         return FixAccount(fix.t_exposure_ns, True, "used", float(z[0]), float(z[1]), float(z[2]), nis)
 
@@ -225,8 +232,9 @@ class ErrorStateFilter:
         sigma = REOPENED_VELOCITY_M_S if rest is None else measurements.REST_VELOCITY_M_S
         measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
         if rest is not None:
-            self._learn(x, P, rest[0], t)
+            self._learn(x, P, self._reckoner.history.between(rest[0], t))
         self._reckoner.has_pose = True
+        self._begin_chain(t, x, P)
         self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
         self.counters.add("fix_starts_the_estimate")
 
@@ -235,11 +243,16 @@ class ErrorStateFilter:
         x = self.x.copy()
         P = np.diag(np.minimum(es.initial_variance(self.noise), es.reopened_variance()))
         measurements.take_pose(fix, x, P, float(x[es.THETA]), REOPENED_VELOCITY_M_S)
+        self._begin_chain(t, x, P)
         self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
         self.counters.add("fix_starts_the_estimate_again")
         return FixAccount(
             fix.t_exposure_ns, True, "starts the estimate again", float(z[0]), float(z[1]), float(z[2]), nis
         )
+
+    def _begin_chain(self, t: float, x: Array, P: Array) -> None:
+        if self._trace is not None:
+            self._trace.chains.append(Chain(t, x.copy(), P.copy(), self._rest_of(t) is not None))
 
     def _accept(self, t: float, x: Array, P: Array, anchor: Array) -> None:
         """Make the corrected state at `t` the checkpoint and integrate from it to now."""
@@ -247,32 +260,60 @@ class ErrorStateFilter:
         self._reckoner.checkpoint_s = t
         self._refused.clear()
         self._rests = [r for r in self._rests if r[1] > t]
-        self._reckoner.history.forget_before(t)
+        if self._trace is None:
+            self._reckoner.history.forget_before(t)
         self._integrate_to_now()
 
-    def _propagate(self, x: Array, P: Array, start_s: float, stop_s: float) -> Array:
+    def _propagate(
+        self,
+        x: Array,
+        P: Array,
+        start_s: float,
+        stop_s: float,
+        steps: list[Carried | Corrected] | None = None,
+    ) -> Array:
         """Carry x and P from `start_s` to `stop_s` in place, through flight and rest; return the anchor."""
         anchor = self._anchor.copy()
         for a, b, resting in self._stretches(start_s, stop_s):
-            if resting:
-                measurements.stand(x, P)
-                self._learn(x, P, a, b)
-                es.age(P, b - a, self.noise)
-                continue
             segment = self._reckoner.history.between(a, b)
-            if len(segment.span_s):
+            if resting:
+                F = measurements.stand(x, P)
+                es.age(P, b - a, self.noise)
+            elif len(segment.span_s):
                 flight = fly(x, segment, self._lag_difference_s)
-                es.move(P, transition(segment, flight), moving_noise(segment, flight, self.noise))
+                rows = transition(segment, flight)
+                es.move(P, rows, moving_noise(segment, flight, self.noise))
                 x[: es.MOVING] = flight.moved
                 es.age(P, flight.duration_s, self.noise)
-                es.forget_wave(x, P, anchor, self.noise)
-
+                keep = es.forget_wave(x, P, anchor, self.noise)
+                F = es.full_transition(rows, keep)
+            else:
+                continue
+            if steps is not None and self._trace is not None:
+                steps.append(Carried(b, F, x.copy(), P.copy(), resting))
+            if resting and (learned := self._learn(x, P, segment)) is not None and steps is not None:
+                steps.append(learned)
         return anchor
 
-    def _learn(self, x: Array, P: Array, start_s: float, stop_s: float) -> None:
-        segment = self._reckoner.history.between(start_s, stop_s)
-        if not measurements.learn_rest(x, P, segment, self.noise):
+    @property
+    def history(self) -> PacketHistory:
+        """The stored packets; all of them when there is a trace."""
+        return self._reckoner.history
+
+    def finish(self) -> None:
+        """Write down the way from the last used fix to the newest packet, for the smoother."""
+        if self._trace is not None and self._trace.chains:
+            steps: list[Carried | Corrected] = []
+            reckoner = self._reckoner
+            self._propagate(self.x.copy(), self.P.copy(), reckoner.checkpoint_s, reckoner.newest_s, steps)
+            self._trace.chains[-1].steps += steps
+
+    def _learn(self, x: Array, P: Array, segment: Segment) -> Corrected | None:
+        try:
+            return measurements.learn_rest(x, P, segment, self.noise)
+        except measurements.RestDisturbed:
             self.counters.add("rest_disturbed")
+            return None
 
     def _stretches(self, start_s: float, stop_s: float) -> list[tuple[float, float, bool]]:
         """Cut an interval at the ends of rests, and flights into steps; True marks rest."""

@@ -11,6 +11,7 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion.estimator import Fix
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import Segment
+from groundstation.fusion.trace import Corrected
 
 Array = NDArray[np.float64]
 
@@ -90,34 +91,44 @@ def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_si
     P[:] = arm @ P @ arm.T
 
 
-def stand(x: Array, P: Array) -> None:
-    """Stop the vehicle in place: velocity zero, as known as can be."""
+def stand(x: Array, P: Array) -> Array:
+    """Stop the vehicle in place: velocity zero, as known as can be; return the transition (22, 22)."""
     v = slice(es.VX, es.VY + 1)
     x[v] = 0.0
     P[v] = 0.0
     P[:, v] = 0.0
     P[es.VX, es.VX] = P[es.VY, es.VY] = REST_VELOCITY_M_S**2
+    F = np.eye(es.SIZE)
+    F[v] = 0.0
+    return F
 
 
-def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> bool:
+class RestDisturbed(ValueError):  # noqa: N818 - it is a finding about the data
+    """The readings spread too wide for a rest."""
+
+
+def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> Corrected | None:
     """Correct biases and slope in place by the mean of packets at rest.
 
     At rest the accelerometers read bias - R(heading)^T slope, the gyro its bias.
 
     Returns:
-        False, and nothing changed, if the readings spread too wide for a rest.
+        The correction, or None if there were too few packets to judge.
+
+    Raises:
+        RestDisturbed: the readings spread too wide for a rest; nothing was changed.
     """
     good = segment.is_hole == 0.0
     n = int(good.sum())
     if n < MIN_REST_PACKETS:
-        return True
+        return None
     readings = np.array([segment.omega_rad_s[good], segment.ax_m_s2[good], segment.ay_m_s2[good]])
     density = np.array(
         [noise.gyro_density_rad_s_rthz, noise.acc_density_m_s2_rthz, noise.acc_density_m_s2_rthz]
     )
     sigma = density / math.sqrt(noise.packet_period_s)
     if (readings.std(axis=1) > MAX_REST_SPREAD * sigma).any():
-        return False
+        raise RestDisturbed
     warmth = float(segment.warmth_k[good].mean())
     c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
     gx, gy = x[es.SLOPE_X] + x[es.WAVE_X], x[es.SLOPE_Y] + x[es.WAVE_Y]
@@ -136,10 +147,12 @@ def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> bool:
         ]
     )
     S = H @ P @ H.T + np.diag(sigma**2 / n)
-    K = np.linalg.solve(S, H @ P).T
-    x += K @ (readings.mean(axis=1) - expected)
+    weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
+    K = P @ H.T @ weight
+    z = readings.mean(axis=1) - expected
+    x += K @ z
     P -= K @ S @ K.T
-    return True
+    return Corrected(H, K, weight, z)
 
 
 def reported(x: Array, omega_rad_s: float) -> Array:

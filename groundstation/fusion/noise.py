@@ -23,8 +23,8 @@ class NoiseModel:
     star_sigma_xy_m: float
     star_sigma_heading_rad: float
 
-    fix_time_sigma_s: float = 1e-3
-    """Of an exposure's stamp against the packets' stamps; matters only in fast motion."""
+    fix_time_sigma_s: float = 0.0
+    """Of an exposure's stamp against the packets', unless the fix's covariance holds it already."""
 
     imu_offset_x_m: float = 0.0
     """Accelerometers from the centre of mass, body frame."""
@@ -55,7 +55,7 @@ class NoiseModel:
     """Time constant of the gyro's low-pass, 1 / (2 pi f)."""
     acc_lag_s: float = 0.0
     max_acc_step_m_s2: float = 0.09
-    """Largest honest change between packets; the valves' largest force, twice, plus noise."""
+    """Largest change of the motion between packets, twice the valves'; the white noise is added to it."""
     max_rate_step_rad_s: float = math.radians(2.0)
     gate_nis: float = 25.0
     """Fixes whose normalised innovation squared (3 degrees of freedom) is above are refused."""

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from groundstation.fusion.noise import NoiseModel
+
+NOISE_SIGMAS = 6.0
+"""Of the difference of two packets; one in a hundred million is beyond."""
 
 
 class PacketScreen:
@@ -15,8 +20,9 @@ class PacketScreen:
     __slots__ = ("_last", "_max_acc", "_max_rate", "_suspect")
 
     def __init__(self, noise: NoiseModel) -> None:
-        self._max_acc = noise.max_acc_step_m_s2
-        self._max_rate = noise.max_rate_step_rad_s
+        per_packet = NOISE_SIGMAS * math.sqrt(2.0 / noise.packet_period_s)
+        self._max_acc = noise.max_acc_step_m_s2 + per_packet * noise.acc_density_m_s2_rthz
+        self._max_rate = noise.max_rate_step_rad_s + per_packet * noise.gyro_density_rad_s_rthz
         self._last: tuple[float, float, float] | None = None
         self._suspect: tuple[float, float, float] | None = None
 

@@ -83,6 +83,9 @@ class Reckoner:
             self.start_clock(t_ns - round(dt * 1e9))
         elif t_ns <= self.newest_ns and not self._clock_restarted(t_ns):
             return False
+        if not self.history.rows:  # whatever came before the first packet is not a hole in the packets
+            dt = self._period
+            self.newest_s = (t_ns - self.origin_ns) * 1e-9 - dt  # type: ignore[operator]  # set above
         t = self.newest_s + dt
         off = (t_ns - self.origin_ns) * 1e-9 - t  # type: ignore[operator]  # start_clock has set the origin
         if -MAX_STAMP_JITTER_S < off < MAX_STAMP_JITTER_S:
@@ -191,9 +194,11 @@ class Reckoner:
         """
         self._x = x.tolist()
         self._theta, self._vx, self._vy, self._px, self._py = moved.tolist()
+        self._unpack()
         if self.rest_from_s <= self.newest_s <= self.rest_to_s:
             self.omega_rad_s = self._force_x = self._force_y = 0.0
-        self._unpack()
+        else:
+            self.omega_rad_s = (self._omega_read - self._bg) * self._gyro_gain
 
     def _warm(self, temperature_c: float) -> None:
         self._temperature_c = temperature_c

@@ -56,7 +56,7 @@ def test_a_rest_on_a_slope_gives_bias_less_slope_and_leaves_their_split_open(noi
         t, np.full(n, 0.01), rng.normal(0.01, 7e-4, n), rng.normal(felt[0], sigma, n),
         rng.normal(felt[1], sigma, n), np.zeros(n), np.zeros(n), 0.0, t[-1],
     )  # fmt: skip
-    assert measurements.learn_rest(x, P, rest, noise)
+    assert measurements.learn_rest(x, P, rest, noise) is not None
     H = np.zeros((2, es.SIZE))
     H[0, 6] = H[1, 7] = 1.0
     for k in (8, 13):
@@ -75,7 +75,8 @@ def test_a_touched_vehicle_is_not_at_rest(noise, x):
     push = np.where(np.arange(n) > 50, 0.05, 0.0)
     zero = np.zeros(n)
     touched = Segment(np.arange(1, n + 1) * 0.01, np.full(n, 0.01), zero, push, zero, zero, zero, 0.0, 1.0)
-    assert not measurements.learn_rest(x, P, touched, noise)
+    with pytest.raises(measurements.RestDisturbed):
+        measurements.learn_rest(x, P, touched, noise)
     np.testing.assert_array_equal(x, before)
 
 

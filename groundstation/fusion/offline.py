@@ -1,0 +1,75 @@
+"""A recording smoothed: the filter forwards, then its trace backwards."""
+
+from __future__ import annotations
+
+from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.smoother import Smoothed, smooth
+from groundstation.fusion.trace import Trace
+
+
+class OfflineSmoother:
+    """Behaves as the filter while it is fed, and then knows better.
+
+    Args:
+        noise: sensors and table of this mock-up.
+    """
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self.noise = noise
+        self._trace = Trace()
+        self._filter = ErrorStateFilter(noise, self._trace)
+        self.counters = self._filter.counters
+        self._rows: list[tuple[int, int]] = []  # stamp and row in the history, -1 for a refused packet
+        self._is_finished = False
+
+    def begin_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle stands still."""
+        self._filter.begin_rest(t_ns)
+
+    def end_rest(self, t_ns: int) -> None:
+        """Say that from this stamp the vehicle may move."""
+        self._filter.end_rest(t_ns)
+
+    def add_imu(self, packet: ImuPacket) -> PlanarState | None:
+        """Take one packet; what is returned is the causal state."""
+        before = len(self._filter.history)
+        state = self._filter.add_imu(packet)
+        after = len(self._filter.history)
+        self._rows.append((packet.t_ns, after - 1 if after > before else -1))
+        return state
+
+    def add_fix(self, fix: Fix) -> FixAccount:
+        """Take a fix."""
+        return self._filter.add_fix(fix)
+
+    def settled(self) -> list[FixAccount]:
+        """Hand over the accounts of fixes that had to wait."""
+        return self._filter.settled()
+
+    def state(self) -> PlanarState | None:
+        """Return the causal state after the newest packet."""
+        return self._filter.state()
+
+    def covariance(self) -> Array:
+        """Return the causal covariance (6, 6) at the newest packet."""
+        return self._filter.covariance()
+
+    def finish(self) -> Smoothed:
+        """End the recording and smooth it."""
+        if not self._is_finished:
+            self._filter.finish()
+            self._is_finished = True
+        return smooth(self._trace, self._filter.history, self.noise)
+
+    def states(self) -> list[PlanarState | None]:
+        """End the recording; return the smoothed state for each packet given, None where there is none."""
+        smoothed = self.finish()
+        values, sigmas = smoothed.state.tolist(), smoothed.std.tolist()
+        return [
+            None
+            if row < 0 or values[row][0] != values[row][0]
+            else PlanarState._make([t_ns, *values[row], *sigmas[row], False])
+            for t_ns, row in self._rows
+        ]

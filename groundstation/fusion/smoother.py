@@ -1,0 +1,152 @@
+"""The offline smoother: every packet's state from all fixes, before and after.
+
+The filter's trace is walked backwards with the modified Bryson-Frazier recursion (Bierman, "Fixed interval
+smoothing with discrete measurements", Int. J. Control 18, 1973), which needs no inverse of a covariance: many
+of these are singular, because a rest knows the velocity and some calibration states are certain.
+Between the ends of two steps the packets are integrated from the smoothed start; what is missing at the end
+is spread as a cubic, which is the mean of an integrated random walk tied at both ends.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.fusion import error_state as es
+from groundstation.fusion import measurements
+from groundstation.fusion.flight import fly
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.packet_history import PacketHistory, Segment
+from groundstation.fusion.trace import Carried, Chain, Trace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """Smoothed state at the end of one step."""
+
+    t_s: float
+    x: Array
+    """(22,)."""
+    P: Array
+    """(22, 22)."""
+    is_rest: bool
+    """Whether the step that ends here was one of rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Smoothed:
+    """Smoothed motion of the centre of mass, table frame; NaN before the first pose."""
+
+    t_s: Array
+    """(n,) ends of the packets since the filter's origin; holes have rows of their own."""
+    state: Array
+    """(n, 9) x, y, heading, vx, vy, omega, bias_omega, bias_ax, bias_ay."""
+    std: Array
+    """(n, 3) of x, y, heading."""
+    nodes: list[Node]
+
+
+def smooth_chain(chain: Chain) -> list[Node]:
+    """Return the smoothed states at the start of a chain and at the end of each of its steps."""
+    lam, Lam = np.zeros(es.SIZE), np.zeros((es.SIZE, es.SIZE))
+    nodes: list[Node] = []
+    for step in reversed(chain.steps):
+        if isinstance(step, Carried):
+            nodes.append(_node(step.stop_s, step.x, step.P, lam, Lam, is_rest=step.is_rest))
+            lam = step.F.T @ lam
+            Lam = step.F.T @ Lam @ step.F
+        else:
+            C = np.eye(es.SIZE) - step.K @ step.H
+            lam = C.T @ lam - step.H.T @ (step.weight @ step.z)
+            Lam = C.T @ Lam @ C + step.H.T @ step.weight @ step.H
+    nodes.append(_node(chain.start_s, chain.x, chain.P, lam, Lam, is_rest=chain.is_rest))
+    nodes.reverse()
+    return nodes
+
+
+def _node(t_s: float, x: Array, P: Array, lam: Array, Lam: Array, *, is_rest: bool) -> Node:
+    smoothed = P - P @ Lam @ P
+    return Node(t_s, x - P @ lam, 0.5 * (smoothed + smoothed.T), is_rest)
+
+
+def smooth(trace: Trace, history: PacketHistory, noise: NoiseModel) -> Smoothed:
+    """Smooth a finished run of the filter.
+
+    Args:
+        trace: what the filter wrote down.
+        history: all packets of the run, as the filter kept them.
+        noise: the filter's model.
+    """
+    t = np.array(history.rows[::7])
+    state = np.full((len(t), 9), math.nan)
+    std = np.full((len(t), 3), math.nan)
+    all_nodes: list[Node] = []
+    for number, chain in enumerate(trace.chains):
+        nodes = smooth_chain(chain)
+        if number == 0 and chain.is_rest:
+            # standing still before the first fix was taken where it stood at that fix
+            first = nodes[0]
+            nodes.insert(0, Node(-math.inf, first.x, first.P, is_rest=True))
+            nodes[1] = Node(first.t_s, first.x, first.P, is_rest=True)
+        for before, after in itertools.pairwise(nodes):
+            rows = slice(*np.searchsorted(t, [before.t_s + 1e-9, after.t_s + 1e-9]))
+            if rows.stop > rows.start:
+                segment = history.between(before.t_s, after.t_s)
+                whole = rows.stop - rows.start  # the packet that the step's end cuts belongs to the next
+                moved, sigma = _between(before, after, segment, noise)
+                state[rows], std[rows] = moved[:whole], sigma[:whole]
+        all_nodes += nodes
+    return Smoothed(t, state, std, all_nodes)
+
+
+def _between(before: Node, after: Node, segment: Segment, noise: NoiseModel) -> tuple[Array, Array]:
+    """Return states (n, 9) and sigmas (n, 3) at the ends of the packets of one step."""
+    x = before.x
+    n = len(segment.span_s)
+    dt = segment.span_s
+    if after.is_rest:
+        omega, theta = np.zeros(n), np.full(n, after.x[es.THETA])
+        v, p, a = np.zeros((2, n)), np.repeat(after.x[es.PX : es.PY + 1, None], n, axis=1), np.zeros((2, n))
+        share = np.ones(n)
+    else:
+        flight = fly(x, segment, noise.gyro_lag_s - noise.acc_lag_s)
+        warm = segment.warmth_k
+        omega = (segment.omega_rad_s - x[es.GYRO_BIAS] - x[es.GYRO_TEMPCO] * warm) * (1.0 - x[es.GYRO_SCALE])
+        theta = x[es.THETA] + np.cumsum(omega * dt)
+        pull = x[es.SLOPE_X : es.SLOPE_Y + 1] + x[es.WAVE_X : es.WAVE_Y + 1]
+        a = flight.force_table + pull[:, None]
+        push = a * dt
+        v = x[es.VX : es.VY + 1, None] + np.cumsum(push, axis=1)
+        p = x[es.PX : es.PY + 1, None] + np.cumsum((v - 0.5 * push) * dt, axis=1)
+        elapsed = np.cumsum(dt)
+        T = float(elapsed[-1])
+        share = elapsed / T
+        left = after.x[: es.MOVING] - np.array([theta[-1], v[0, -1], v[1, -1], p[0, -1], p[1, -1]])
+        theta = theta + left[es.THETA] * share
+        dv, dp = left[es.VX : es.VY + 1, None], left[es.PX : es.PY + 1, None]
+        p = p + (3 * share**2 - 2 * share**3) * dp + (share**3 - share**2) * T * dv
+        v = v + 6 * (share - share**2) / T * dp + (3 * share**2 - 2 * share) * dv
+    theta = theta + noise.gyro_lag_s * omega
+    p = p + noise.acc_lag_s * v
+    v = v + noise.acc_lag_s * a
+    c, s = np.cos(theta), np.sin(theta)
+    rx, ry = after.x[es.LEVER_X], after.x[es.LEVER_Y]
+    lx, ly = c * rx - s * ry, s * rx + c * ry
+    g = after.x[es.SLOPE_X : es.SLOPE_Y + 1] + after.x[es.WAVE_X : es.WAVE_Y + 1]
+    warmth = segment.warmth_k
+    bias = [
+        after.x[es.GYRO_BIAS] + after.x[es.GYRO_TEMPCO] * warmth,
+        after.x[es.ACC_BIAS_X] + after.x[es.ACC_TEMPCO_X] * warmth - (c * g[0] + s * g[1]),
+        after.x[es.ACC_BIAS_Y] + after.x[es.ACC_TEMPCO_Y] * warmth - (c * g[1] - s * g[0]),
+    ]
+    state = np.column_stack([p[0] - lx, p[1] - ly, theta, v[0] + omega * ly, v[1] - omega * lx, omega, *bias])
+    ends = [np.diag(measurements.reported(node.x, 0.0) @ node.P @ measurements.reported(node.x, 0.0).T)
+            for node in (before, after)]  # fmt: skip
+    variance = np.outer(1.0 - share, ends[0][:3]) + np.outer(share, ends[1][:3])
+    return state, np.sqrt(np.maximum(variance, 0.0))
