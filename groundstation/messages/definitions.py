@@ -164,7 +164,8 @@ class Imu(Message):
     """Calibrated averages over one window; the stamp is the END of the window.
 
     Attributes:
-        tick_ms: Unwrapped 1 kHz tick of the MCU at the end of the window.
+        tick_ms: Unwrapped 1 kHz tick of the MCU at the end of the window; begins anew with the block.
+        elapsed_ms: Ticks since the sample before, 0 after a restart: what an integration has to use.
         window_s: Length of the averaging window by the MCU's clock.
         stamp_sigma_s: Standard deviation of the stamp, phase bias included.
         rate_body_rad_s: Turn rate about body z, scale applied, zero offset not removed.
@@ -177,6 +178,7 @@ class Imu(Message):
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuSample"
     tick_ms: U64
+    elapsed_ms: U32
     window_s: F64
     stamp_sigma_s: F64
     rate_body_rad_s: F64

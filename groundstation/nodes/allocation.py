@@ -5,21 +5,25 @@ from collections.abc import Iterator
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.messages.base import Message
-from groundstation.messages.definitions import ValveDemand, Wrench
+from groundstation.messages.definitions import ValveCommand, ValveDemand, Wrench
 from groundstation.nodes.node import Node
 
 
 class Allocation(Node):
     """Turns each wrench of the controller into pulses; the controller's rate is the modulation's."""
 
-    inputs = (Wrench,)
+    inputs = (Wrench, ValveCommand)
     outputs = (ValveDemand,)
 
     def __init__(self, vehicle: str, modulator: PulseModulator) -> None:
         super().__init__(vehicle)
         self._modulator = modulator
+        self._gate_open = False
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        if isinstance(message, ValveCommand):
+            self._hear_gate(is_open=message.gate == "open")
+            return
         assert isinstance(message, Wrench)
         demand = BodyWrench((message.force_x_n, message.force_y_n), message.torque_z_nm)
         pulses = self._modulator.update(demand)
@@ -30,3 +34,9 @@ class Allocation(Node):
             pulses.delivered.force_body_n,
             pulses.delivered.torque_nm,
         )
+
+    def _hear_gate(self, *, is_open: bool) -> None:
+        """What was carried while the valves were closed is of no use when they open."""
+        if is_open and not self._gate_open:
+            self._modulator.reset()
+        self._gate_open = is_open

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
+from groundstation.control.edge import EdgeVerdict, edge_outlook
 from groundstation.control.envelope import WrenchEnvelope
+from groundstation.control.keep_in import KeepIn
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux as Choice
 from groundstation.control.mux import MuxConfig, Selection, Source
@@ -16,10 +18,22 @@ from groundstation.nodes.node import Node
 
 PERIOD_NS = 20_000_000
 CLOSED = bytes(8)
+RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
+SLOPE_M_S2 = 0.005  # a table half a milliradian off level
+REACTION_S = 0.15  # age of the state, a modulation period, the opening of a valve
 
 
 class CommandMux(Node):
-    """Says every 20 ms, and at once on a new demand, what the valves are to do and who wants it."""
+    """Says every 20 ms, and at once on a new demand, what the valves are to do and who wants it.
+
+    Args:
+        vehicle: Its name.
+        config: How long each source stays fresh.
+        brake: The brake law.
+        model: Mass properties and valves.
+        modulator: For braking, apart from that of the controller.
+        keep_in: Region of the table; a vehicle that would not stop inside is braked.
+    """
 
     inputs = (ValveDemand, VehicleState, Request)
     outputs = (ValveSelection, Ack)
@@ -31,8 +45,10 @@ class CommandMux(Node):
         brake: BrakeConfig,
         model: VehicleModel,
         modulator: PulseModulator,
+        keep_in: KeepIn,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
+        self._keep_in = keep_in
         self._choice: Choice[bytes] = Choice(config)
         self._brake = brake
         self._model = model
@@ -42,6 +58,7 @@ class CommandMux(Node):
         self._brake_due_ns = 0
         self._brake_asked = False
         self._state: ControlState | None = None
+        self._braking_m_s2 = RELIED_ON * self._envelope.max_force_n / model.mass_kg - SLOPE_M_S2
         self._counter = self._pulse_id = 0
         self._on_time_ms = CLOSED
         self._source: Source | None = None
@@ -68,7 +85,15 @@ class CommandMux(Node):
     def tick(self, now_ns: int) -> Iterator[Message]:
         if self._brake_asked:
             self._choice.brake(now_ns, "asked for by request")
+        elif self._is_leaving():
+            self._choice.brake(now_ns, "it would not stop before the edge of the table")
         yield self._select(now_ns)
+
+    def _is_leaving(self) -> bool:
+        if self._state is None:
+            return False
+        outlook = edge_outlook(self._state, self._keep_in, self._braking_m_s2, reaction_s=REACTION_S)
+        return outlook.verdict is not EdgeVerdict.CLEAR
 
     def _select(self, now_ns: int) -> ValveSelection:
         selection = self._choice.select(now_ns)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller as ControlLaw
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
@@ -58,6 +59,7 @@ class Controller(Node):
         self._keep_in = keep_in
         self._neighbours = neighbours
         self._states: dict[str, tuple[int, ControlState]] = {}
+        self._own_rate = RateMean()
         self._gate_open = False
         self._delivered = NO_WRENCH
         self._ticks = 0
@@ -76,7 +78,9 @@ class Controller(Node):
                     message.heading_rad,
                     message.rate_rad_s,
                 )
-                self._states[message.vehicle] = (now_ns, state)
+                self._states[message.vehicle] = (message.stamp_ns, state)
+                if message.vehicle == self.vehicle:
+                    self._own_rate.add(state)
             case ValveDemand():
                 self._delivered = BodyWrench(message.delivered_force_body_n, message.delivered_torque_nm)
             case ValveCommand():
@@ -88,9 +92,13 @@ class Controller(Node):
                 yield answer(message, now_ns, self._go_to(message))
 
     def tick(self, now_ns: int) -> Iterator[Message]:
-        fresh = {name: state for name, (at, state) in self._states.items() if now_ns - at <= STALE_NS}
-        state = fresh.pop(self.vehicle, None)
-        if state is None:
+        fresh = {
+            name: state.carried((now_ns - stamp_ns) * 1e-9)
+            for name, (stamp_ns, state) in self._states.items()
+            if now_ns - stamp_ns <= STALE_NS
+        }
+        state = self._own_rate.take()
+        if state is None or fresh.pop(self.vehicle, None) is None:
             return
         wrench = self._law.update(
             state,

@@ -46,7 +46,7 @@ class Fusion(Node):
         self._estimator = estimator
         self._method = method
         self._floor = np.diag([floor_std[0] ** 2, floor_std[0] ** 2, floor_std[1] ** 2])
-        self._tick_ms: int | None = None
+        self._skipped_ms = 0
         self._rest_since_ns: int | None = None
         self._rest_ns = 0
         self._float_ordered_ns = -ORDER_HOLDS_NS
@@ -96,9 +96,11 @@ class Fusion(Node):
     def _propagate(self, imu: Imu) -> Iterator[Message]:
         """Integrate with the MCU's ticks; stamps only place the sample against the camera."""
         if not imu.valid:
+            self._skipped_ms += imu.elapsed_ms
             return
-        before, self._tick_ms = self._tick_ms, imu.tick_ms
-        dt_s = imu.window_s if before is None or imu.tick_ms <= before else (imu.tick_ms - before) * 1e-3
+        # samples that were refused as implausible are a hole of the same kind as lost frames
+        dt_s = (imu.elapsed_ms + self._skipped_ms) * 1e-3 if imu.elapsed_ms else imu.window_s
+        self._skipped_ms = 0
         packet = ImuPacket(imu.stamp_ns, dt_s, imu.rate_body_rad_s, *imu.force_body_m_s2, imu.temperature_c)
         state = self._estimator.add_imu(packet)
         for account in self._estimator.settled():

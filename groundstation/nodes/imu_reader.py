@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from drivers.imu_block.clock import TickClock, TickStamp
 from drivers.imu_block.commands import encode_set_averaging
-from drivers.imu_block.protocol import FrameParser, ImuFrame
+from drivers.imu_block.protocol import DEFAULT_V1_SAMPLE_COUNT, FrameParser, ImuFrame
 from drivers.imu_block.sensors import Environment, Plausibility, rate_rad_s, specific_force_m_s2
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import Diagnostics, Imu, ImuBytes, ImuOrder, ImuRaw
@@ -25,7 +25,8 @@ class ImuReader(Node):
         version: ``auto``, ``v1`` or ``v2``.
         baud: Of the line.
         latency_timer_s: Of the USB adapter.
-        averaging: Polls per frame that the rig wants, None to take what comes.
+        averaging: Polls per frame. Version 2 says its own and is asked for this one if it differs;
+            version 1 does not say, so this is what it is taken to have. None: as it comes, or 8.
     """
 
     inputs = (ImuBytes,)
@@ -35,7 +36,7 @@ class ImuReader(Node):
         self, vehicle: str, version: str, baud: int, latency_timer_s: float, averaging: int | None
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self._parser = FrameParser(VERSIONS[version])
+        self._parser = FrameParser(VERSIONS[version], v1_sample_count=averaging or DEFAULT_V1_SAMPLE_COUNT)
         self._clock = TickClock(baud, latency_timer_s=latency_timer_s)
         self._plausibility = Plausibility()
         self._environment = Environment()
@@ -77,12 +78,13 @@ class ImuReader(Node):
 
     def _sample(self, frame: ImuFrame, stamp: TickStamp) -> Imu:
         faults = self._plausibility.update(frame, self._environment.status)
-        self._seen_averaging = frame.sample_count
+        self._seen_averaging = frame.sample_count if frame.version > 1 else self._averaging
         x, y = frame.tilt_difference_counts
         return Imu(
             stamp.stamp_ns,
             self.vehicle,
             stamp.tick,
+            stamp.elapsed_ticks or 0,
             frame.sample_count * TICK_S,
             stamp.stamp_std_s,
             rate_rad_s(frame.gyro_counts),

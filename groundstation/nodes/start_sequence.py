@@ -83,4 +83,6 @@ class StartSequence(Node):
             if mode.source not in (GUARD_STARTED, "start_sequence"):
                 return "disarmed", f"by {mode.source}", ""
             return "arming", "", "arm"
+        if not valves.armed:  # the node missed the order, or started anew
+            return "arming", "the valve node is not armed", "arm"
         return "flying", "", ""

@@ -56,7 +56,8 @@ def _keep_in(rig: Rig) -> KeepIn:
 def command_mux(rig: Rig, vehicle: str) -> Node:
     """The multiplexer of a vehicle, with a modulator of its own for braking."""
     mock_up = rig.mock_up_of(vehicle)
-    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), _model(mock_up), _modulator(mock_up))
+    model, modulator = _model(mock_up), _modulator(mock_up)
+    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), model, modulator, _keep_in(rig))
 
 
 def guard(rig: Rig, vehicle: str) -> Node:
