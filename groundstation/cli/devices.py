@@ -2,6 +2,7 @@
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -11,6 +12,7 @@ from serial.tools import list_ports
 
 from drivers.imu_block.identify import BAUDS, LISTEN_S, PortReport, ask_url
 from groundstation.cli.errors import UsageError
+from groundstation.runtime.rig import load_rig
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -25,12 +27,16 @@ def devices(
     ] = None,
     baud: Annotated[list[int] | None, typer.Option(help="Bit rates to try; may be repeated.")] = None,
     listen_s: Annotated[float, typer.Option(help="Longest wait per port and bit rate, s.")] = LISTEN_S,
+    rig: Annotated[
+        Path | None, typer.Option(help="Rig file whose imu_serial_number says which mock-up a block is.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON list instead of a table.")] = False,
 ) -> None:
     """Ask every serial port who is there, and say which mock-up's IMU block it is.
 
-    Example: groundstation devices /dev/ttyUSB0 socket://127.0.0.1:4001
+    Example: groundstation devices --rig examples/rigs/two_mock_ups.toml
     """
+    owners = _owners(rig)
     bauds = tuple(baud or BAUDS)
     if any(rate <= 0 for rate in bauds):
         raise UsageError(f"--baud is {min(bauds)}, expected a positive bit rate such as 250000")
@@ -50,16 +56,29 @@ def devices(
     if ports and len(problems) == len(reports):
         raise UsageError("; ".join(problems))
     if as_json:
-        print(json.dumps([_as_dict(report) for report in reports], indent=1))
+        print(json.dumps([_as_dict(report, owners) for report in reports], indent=1))
     else:
-        _print_table(reports)
+        _print_table(reports, owners)
     if ports and problems:
         raise typer.Exit(2)
 
 
-def _as_dict(report: PortReport) -> dict[str, Any]:
+def _owners(rig: Path | None) -> dict[int, str]:
+    """Mock-ups by the serial number of their IMU block."""
+    if rig is None:
+        return {}
+    vehicles = load_rig(rig).vehicles
+    return {v.imu_serial_number: name for name, v in vehicles.items() if v.imu_serial_number is not None}
+
+
+def _owner(report: PortReport, owners: dict[int, str]) -> str | None:
+    return None if report.identity is None else owners.get(report.identity.serial_number)
+
+
+def _as_dict(report: PortReport, owners: dict[int, str]) -> dict[str, Any]:
     who = report.identity
     return {
+        "mock_up": _owner(report, owners),
         "port": report.url,
         "baud": report.baud,
         "imu_block": report.is_imu_block,
@@ -73,8 +92,8 @@ def _as_dict(report: PortReport) -> dict[str, Any]:
     }
 
 
-def _print_table(reports: list[PortReport]) -> None:
-    table = Table("port", "baud", "who is there")
+def _print_table(reports: list[PortReport], owners: dict[int, str]) -> None:
+    table = Table("port", "baud", "mock-up", "who is there")
     for report in reports:
-        table.add_row(report.url, str(report.baud), report.sentence)
+        table.add_row(report.url, str(report.baud), _owner(report, owners) or "-", report.sentence)
     Console().print(table)

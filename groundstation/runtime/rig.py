@@ -129,6 +129,7 @@ class VehicleSection(_Section):
     mock_up: str
     bus_index: int = Field(ge=0, le=15)
     imu: str
+    imu_serial_number: int | None = Field(default=None, ge=0, le=65535)
     star_camera: str | None = None
     fixes: str | None = None
     reference: str | None = None
