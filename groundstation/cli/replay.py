@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from calibration.camera import CalibrationFileError
 from groundstation.cli.errors import UsageError
 from groundstation.nodes.node import Node
 from groundstation.recording.errors import RecordingError
@@ -97,6 +98,8 @@ def _factory(rig: Rig) -> Callable[[str], Node]:
             return make_node(rig, key)
         except KeyError:
             raise UsageError(f"the rig {rig.name!r} has no node {key!r}") from None
+        except CalibrationFileError as error:
+            raise UsageError(f"{key} cannot be made: {error}") from error
 
     return make
 

@@ -67,6 +67,13 @@ def test_a_recovered_flight_replays(tmp_path, flight):
     assert call(tmp_path / "torn.mcap")[0] == 0
 
 
+def test_a_rig_without_the_node_is_refused(tmp_path, flight):
+    rig = tmp_path / "other.toml"
+    rig.write_text(RIG.read_text().replace("alpha", "gamma"))
+    with pytest.raises(UsageError, match="has no node 'alpha/fusion'"):
+        call(flight, "--node", "alpha/fusion", "--rig", rig)
+
+
 def test_a_refused_replay_leaves_no_file(tmp_path, flight):
     with pytest.raises(UsageError, match="'alpha/fuson'"):
         call(flight, "--node", "alpha/fuson", "--out", tmp_path / "out.mcap")
