@@ -155,10 +155,9 @@ class ImuSensors:
         self._walk_rad_s = 0.0
         self._outlier_rate_hz = outlier_rate_hz
         self._polls_to_outlier = self._draw_outlier()
-        self._null = np.array([[GYRO_NULL], [TILT_NULL], [TILT_NULL], [TILT_NULL], [TILT_NULL]])
-        half_x, half_y = errors.imbalance_counts[0] / 2.0, errors.imbalance_counts[1] / 2.0
-        self._null[1:3] += half_x
-        self._null[3:5] += half_y
+        # What X + Y is off 2048 by is shared by both channels.
+        self._null_x = TILT_NULL + errors.imbalance_counts[0] / 2.0
+        self._null_y = TILT_NULL + errors.imbalance_counts[1] / 2.0
         self._top = np.array([[GYRO_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP]])
 
     @staticmethod
@@ -206,9 +205,8 @@ class ImuSensors:
         gyro_gain *= 1.0 + errors.gyro_scale_tempco_per_k * warmer_k
         null_x = errors.acc_bias_m_s2[0] + errors.acc_tempco_m_s2_k[0] * warmer_k
         null_y = errors.acc_bias_m_s2[1] + errors.acc_tempco_m_s2_k[1] * warmer_k
-        is_alike = len(felt) == 1 and isinstance(felt[0].rate_rad_s, float)
-        signal = np.empty((_CHANNELS, 1 if is_alike else polls))
-        signal[:] = self._null
+        gyro_null = GYRO_NULL + null_rad_s * GYRO_COUNTS_PER_RAD_S
+        signal = np.empty((_CHANNELS, polls))
         start = 0
         for part in felt:
             end = start + part.polls
@@ -216,11 +214,17 @@ class ImuSensors:
             x = errors.acc_scale[0] * force_x + (errors.acc_cross[0] * force_y + null_x)
             y = errors.acc_scale[1] * force_y + (errors.acc_cross[1] * force_x + null_y)
             x_counts, y_counts = x * TILT_COUNTS_PER_M_S2, y * TILT_COUNTS_PER_M_S2
-            signal[0, start:end] += gyro_gain * part.rate_rad_s + null_rad_s * GYRO_COUNTS_PER_RAD_S
-            signal[1, start:end] += x_counts
-            signal[2, start:end] -= x_counts
-            signal[3, start:end] += y_counts
-            signal[4, start:end] -= y_counts
+            codes = (
+                gyro_null + gyro_gain * part.rate_rad_s,
+                self._null_x + x_counts,
+                self._null_x - x_counts,
+                self._null_y + y_counts,
+                self._null_y - y_counts,
+            )
+            if len(felt) == 1 and isinstance(part.rate_rad_s, float):
+                return np.array(codes)[:, None]
+            for row, code in zip(signal, codes, strict=True):
+                row[start:end] = code
             start = end
         return signal
 

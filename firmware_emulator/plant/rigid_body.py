@@ -17,7 +17,7 @@ from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S, ThrusterB
 
 _LONGEST_PIECE_NS = 10_000_000
 _LONGEST_SLIDE_NS = 1_000_000  # dry friction turns with the velocity and ends abruptly
-_SAME_SLOPE_M = 2.5e-4  # over which a wave of 0.8 m and 0.1 mrad changes the slope by 2 um/s^2
+_SAME_SLOPE_M = 5e-4  # over which a wave of 0.8 m and 0.05 mrad changes the slope by 2 um/s^2
 
 
 @dataclass(frozen=True, slots=True)

@@ -207,4 +207,4 @@ class ThrusterBank:
         return (fx, fy, torque), gas_n
 
 
-_NO_THRUST_N = 1e-9  # a decayed thrust this small is none: coasting is cheaper than pushing with it
+_NO_THRUST_N = 1e-7  # a decayed thrust this small is none: coasting is cheaper than pushing with it
