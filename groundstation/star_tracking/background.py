@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 WEIGHT_SUM = 81.0  # of the smoothing kernel, per axis 1+2+3+2+1 = 9
 WEIGHT_SQUARE_SUM = 361.0  # per axis 1+4+9+4+1 = 19: noise of the sum over noise of a pixel, squared
 _CELL_PX = 16
-_THIN = (5, 7)  # every 5th row, every 7th column: coprime to the cells and to a colour mosaic
+_THIN = (7, 11)  # every 7th row, every 11th column: coprime to the cells and to a colour mosaic
 _MIN_VARIANCE_DN2 = 1.0 / 12.0  # an 8-bit picture is never better than its rounding
 
 

@@ -78,7 +78,8 @@ class PublishedTracker:
         """Give, for every triangle of spots, the catalogue's triangles of like angles."""
         if len(angles) == 0:
             return []
-        return list(self._tree.query_ball_point(angles, ANGLE_TOLERANCE_RAD, p=np.inf))
+        found = self._tree.query_ball_point(angles, ANGLE_TOLERANCE_RAD, p=np.inf)
+        return [list(each) for each in np.asarray(found, dtype=object)]
 
     def _fix(self, matrix: Array, centre: Array, spot: NDArray[np.int64], star: NDArray[np.int64]) -> StarFix:
         place = np.median(centre, axis=0)

@@ -65,30 +65,37 @@ def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shi
     lever[:, 0, 0] = lever[:, 1, 1] = 1.0
     lever[:, 0, 2], lever[:, 1, 2] = -q_body_m.imag, q_body_m.real
     weighted = weight @ lever
-    normal = lever.transpose(0, 2, 1) @ weighted
+    normal = (lever.transpose(0, 2, 1) @ weighted).reshape(n, 9)
     kept = np.ones(n)
     scale2 = 1.0
-    information = normal.sum(axis=0)
+    e = _error(q_body_m, star_m, turn, shift_m)
     for _ in range(_STEPS):
-        error = np.conj(turn) * (star_m - shift_m) - q_body_m
-        e = np.stack((error.real, error.imag), axis=1)
         gradient = np.einsum("nij,ni->nj", weighted, e)
-        information = np.tensordot(kept, normal, axes=1)
+        information = _weighted_sum(kept, normal)
         step = np.linalg.solve(information, kept @ gradient)
         shift_m = shift_m + turn * complex(step[0], step[1])
         turn = turn * np.exp(1j * step[2])
-        error = np.conj(turn) * (star_m - shift_m) - q_body_m
-        e = np.stack((error.real, error.imag), axis=1)
-        distance2 = np.einsum("ni,nij,nj->n", e, weight, e)
+        e = _error(q_body_m, star_m, turn, shift_m)
+        distance2 = ((weight @ e[:, :, None])[:, :, 0] * e).sum(axis=1)
         fresh, scale2 = _clip(distance2)
         if np.array_equal(fresh, kept) and abs(step[2]) < 1e-7:
             break
         kept = fresh
-    information = np.tensordot(kept, normal, axes=1)
+    information = _weighted_sum(kept, normal)
     rotation = np.eye(3)
     rotation[:2, :2] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
     cov = rotation @ (np.linalg.inv(information) * scale2) @ rotation.T
     return Pose(complex(turn), complex(shift_m), 0.5 * (cov + cov.T), kept > 0.5, float(np.sqrt(scale2)))
+
+
+def _error(q_body_m: Complex, star_m: Complex, turn: complex, shift_m: complex) -> Array:
+    """Give star minus spot in body axes, shape (n, 2)."""
+    error = np.ascontiguousarray(np.conj(turn) * (star_m - shift_m) - q_body_m)
+    return error.view(np.float64).reshape(-1, 2)
+
+
+def _weighted_sum(kept: Array, normal: Array) -> Array:
+    return np.asarray((kept @ normal).reshape(3, 3))
 
 
 def _clip(distance2: Array) -> tuple[Array, float]:
@@ -96,7 +103,7 @@ def _clip(distance2: Array) -> tuple[Array, float]:
     n = len(distance2)
     # Of three unknowns n stars keep 2n - 3 degrees of freedom: small samples look better than they are.
     freedom = max(2.0 * n - 3.0, 1.0)
-    robust = float(np.median(distance2)) / 1.386 * (2.0 * n / freedom)
+    robust = float(np.sort(distance2)[n // 2]) / 1.386 * (2.0 * n / freedom)
     limit = _CLIP_SIGMAS**2 * max(robust, 0.5) * 1.3
     kept = distance2 <= limit
     if int(kept.sum()) < 3:

@@ -8,6 +8,14 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
+_STEPS = 3
+_MAX_STEP_PX = 2.0
+_OUTLIER_SIGMAS = 5.0
+_MISFIT_RATIO = 0.3  # the true image is no Gaussian: so much of the model is no outlier
+_STREAK_RATIO2 = 2.0  # long over short axis, squared, from where a spot counts as a streak
+_TRUNCATION = 1.12  # second moments over a finite footprint come out this much too small
+_WIDTH2_LIMITS_PX2 = (0.3, 16.0)
+
 
 @dataclass(frozen=True, eq=False)
 class SpotPixels:
@@ -68,18 +76,128 @@ class FittedSpots:
 
 
 def fit_spots(pixels: SpotPixels) -> FittedSpots:
-    """Give intensity-weighted centres with their covariance."""
+    """Fit every spot's centre and light, all spots at once.
+
+    Moments give the first guess and the shape: one width for the picture, and a streak for every spot
+    whose second moments say so. Then Gauss-Newton steps fit a Gaussian of that shape to the pixels,
+    weighted by read and shot noise, saturated pixels and outliers left out.
+    """
+    guess = _moments(pixels)
+    shape = _shapes(guess)
+    u, v, flux, cov, trusted = _gauss_newton(pixels, guess, shape)
+    half = 0.5 * (shape[0] + shape[2])
+    spread = np.hypot(0.5 * (shape[0] - shape[2]), shape[1])
+    return FittedSpots(
+        u_px=np.where(trusted, u, guess.u_px),
+        v_px=np.where(trusted, v, guess.v_px),
+        flux_dn=np.where(trusted, flux, guess.flux_dn),
+        cov_px2=np.where(trusted, cov, guess.cov_px2).T.copy(),
+        elongation=np.sqrt((half + spread) / np.maximum(half - spread, 1e-3)),
+        streak_px=_streaks(shape),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moments:
+    """Zeroth to second moments: light, centre, spread (uu, uv, vv; (3, n)), covariance of the centre."""
+
+    flux_dn: Vector
+    u_px: Vector
+    v_px: Vector
+    spread_px2: Vector
+    cov_px2: Vector
+
+
+def _moments(pixels: SpotPixels) -> _Moments:
     starts, owner = pixels.starts, pixels.owner
-    light = np.maximum(pixels.light_dn, 0.0)
+    light = pixels.light_dn
     flux = np.maximum(np.add.reduceat(light, starts), 1e-9)
     u = np.add.reduceat(light * pixels.u_px, starts) / flux
     v = np.add.reduceat(light * pixels.v_px, starts) / flux
     du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
-    variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * light
-    moments = np.add.reduceat(light * np.stack((du * du, du * dv, dv * dv)), starts, axis=1) / flux
-    cov = np.add.reduceat(variance * np.stack((du * du, du * dv, dv * dv)), starts, axis=1) / flux**2
-    half = 0.5 * (moments[0] + moments[2])
-    spread = np.hypot(0.5 * (moments[0] - moments[2]), moments[1])
-    long, short = half + spread, np.maximum(half - spread, 1e-3)
-    elongation = np.sqrt(long / short)
-    return FittedSpots(u, v, flux, cov.T.copy(), elongation, np.zeros((len(u), 2)))
+    square = np.stack((du * du, du * dv, dv * dv))
+    variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * np.maximum(light, 0.0)
+    spread = np.add.reduceat(light * square, starts, axis=1) / flux
+    cov = np.add.reduceat(variance * square, starts, axis=1) / flux**2
+    return _Moments(flux, u, v, spread, cov)
+
+
+def _shapes(moments: _Moments) -> Vector:
+    """Give the Gaussian shape (uu, uv, vv; (3, n)) of every spot: round unless it surely is a streak."""
+    uu, uv, vv = moments.spread_px2
+    half, spread = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
+    width2 = float(np.clip(np.median(half - spread) * _TRUNCATION, *_WIDTH2_LIMITS_PX2))
+    long2 = half + spread
+    streaked = long2 > _STREAK_RATIO2 * np.maximum(half - spread, width2 / _TRUNCATION)
+    # The part of the spread beyond the round image is the streak's, along its own direction.
+    extra = np.where(streaked, np.maximum(long2 - width2, 0.0), 0.0)
+    angle2 = np.arctan2(2.0 * uv, uu - vv)
+    cosine2, sine2 = np.cos(angle2), np.sin(angle2)
+    return np.stack(
+        (
+            width2 + 0.5 * extra * (1.0 + cosine2),
+            0.5 * extra * sine2,
+            width2 + 0.5 * extra * (1.0 - cosine2),
+        )
+    )
+
+
+def _streaks(shape: Vector) -> Vector:
+    """Give the streak (du, dv) of every spot, (n, 2): a uniform line of length l spreads l^2 / 12."""
+    uu, uv, vv = shape
+    length = np.sqrt(12.0 * 2.0 * np.hypot(0.5 * (uu - vv), uv))
+    angle = 0.5 * np.arctan2(2.0 * uv, uu - vv)
+    return np.stack((length * np.cos(angle), length * np.sin(angle)), axis=1)
+
+
+def _gauss_newton(
+    pixels: SpotPixels, guess: _Moments, shape: Vector
+) -> tuple[Vector, Vector, Vector, Vector, NDArray[np.bool_]]:
+    """Fit centre and light with the shapes held; give also covariance (3, n) and whether to trust it."""
+    starts, owner = pixels.starts, pixels.owner
+    determinant = shape[0] * shape[2] - shape[1] ** 2
+    a, b, c = (
+        (shape[2] / determinant)[owner],
+        (-shape[1] / determinant)[owner],
+        (shape[0] / determinant)[owner],
+    )
+    norm = 1.0 / (2.0 * np.pi * np.sqrt(determinant))
+    u, v, flux = guess.u_px.copy(), guess.v_px.copy(), guess.flux_dn.copy()
+    usable = ~pixels.is_saturated
+    cov = guess.cov_px2
+    trusted = np.ones(len(u), dtype=bool)
+    for step in range(_STEPS):
+        du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
+        along_u, along_v = a * du + b * dv, b * du + c * dv
+        unit = norm[owner] * np.exp(-0.5 * (along_u * du + along_v * dv))
+        model = flux[owner] * unit
+        error = pixels.light_dn - model
+        variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * np.maximum(model, 0.0)
+        if step == _STEPS - 1:
+            usable = usable & (error * error < _OUTLIER_SIGMAS**2 * variance + (_MISFIT_RATIO * model) ** 2)
+        weight = usable / variance
+        d_u, d_v = model * along_u, model * along_v
+        w_u, w_v, w_f = weight * d_u, weight * d_v, weight * unit
+        products = np.stack(
+            (
+                *(w_u * d_u, w_u * d_v, w_v * d_v),
+                *(w_u * unit, w_v * unit, w_f * unit),
+                *(w_u * error, w_v * error, w_f * error),
+            )
+        )
+        n_uu, n_uv, n_vv, n_uf, n_vf, n_ff, g_u, g_v, g_f = np.add.reduceat(products, starts, axis=1)
+        # Eliminate the light, then solve the 2x2 system of the centre.
+        n_ff = np.maximum(n_ff, 1e-300)
+        n_uu, n_uv, n_vv = n_uu - n_uf * n_uf / n_ff, n_uv - n_uf * n_vf / n_ff, n_vv - n_vf * n_vf / n_ff
+        h_u, h_v = g_u - n_uf * g_f / n_ff, g_v - n_vf * g_f / n_ff
+        det = n_uu * n_vv - n_uv * n_uv
+        trusted &= (det > 0.0) & (n_uu > 0.0)
+        det = np.where(trusted, det, 1.0)
+        step_u, step_v = (n_vv * h_u - n_uv * h_v) / det, (n_uu * h_v - n_uv * h_u) / det
+        trusted &= (np.abs(step_u) < _MAX_STEP_PX) & (np.abs(step_v) < _MAX_STEP_PX)
+        step_u, step_v = np.where(trusted, step_u, 0.0), np.where(trusted, step_v, 0.0)
+        u, v = u + step_u, v + step_v
+        flux = flux + np.where(trusted, (g_f - n_uf * step_u - n_vf * step_v) / n_ff, 0.0)
+        cov = np.stack((n_vv, -n_uv, n_uu)) / det
+    trusted &= flux > 0.0
+    return u, v, flux, cov, trusted

@@ -45,6 +45,7 @@ class TrackerSettings:
         min_stars_prior: Stars of a fix with a prior.
         identified_spots: The brightest so many spots take part in the search.
         pair_spots: The brightest so many take part in the search by pairs.
+        pair_spots_total: With more spots than this pairs are not tried.
         look_ups: Cap on tested spot positions per picture.
     """
 
@@ -55,6 +56,7 @@ class TrackerSettings:
     min_stars_prior: int = 3
     identified_spots: int = 60
     pair_spots: int = 12
+    pair_spots_total: int = 20
     look_ups: int = 150_000
 
 
@@ -124,6 +126,8 @@ class StarTracker:
                 fix = self._best(spots, points, q, poses, search)
                 if fix is not None:
                     return fix
+        if len(q) > self.settings.pair_spots_total:
+            return None  # triangles fail on many spots only if they are no stars
         q = q[: self.settings.pair_spots]
         first, second = np.triu_indices(len(q), k=1)
         length = np.abs(q[first] - q[second])
@@ -183,9 +187,12 @@ class StarTracker:
         spot = np.flatnonzero(distance < gate_m)
         if len(spot) == 0:
             return spot, spot
-        spot = spot[np.argsort(distance[spot], kind="stable")]
-        _, first = np.unique(star[spot], return_index=True)
-        spot = np.sort(spot[first])
+        order = spot[np.argsort(star[spot], kind="stable")]
+        named = star[order]
+        if (named[1:] == named[:-1]).any():
+            spot = spot[np.argsort(distance[spot], kind="stable")]
+            _, first = np.unique(star[spot], return_index=True)
+            spot = np.sort(spot[first])
         return spot, star[spot]
 
     def _settle(

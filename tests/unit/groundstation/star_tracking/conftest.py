@@ -62,11 +62,8 @@ class SkyPainter:
         h, w = self.camera.height, self.camera.width
         electrons = np.full((h, w), self.background_dn / self.dn_per_e)
         velocity = np.asarray(velocity, float)
-        times = np.linspace(-0.5, 0.5, 1 if not velocity.any() else 41) * exposure_s
-        if velocity.any():
-            times = (np.arange(41) + 0.5) / 41 * exposure_s - 0.5 * exposure_s
-        else:
-            times = np.zeros(1)
+        steps = 41 if velocity.any() else 1
+        times = ((np.arange(steps) + 0.5) / steps - 0.5) * exposure_s
         lit = np.ones(len(self.stars_m), bool) if lit is None else lit
         home = self.project(*pose)
         rows = np.nan_to_num(home[:, 1])
