@@ -5,7 +5,6 @@ attachment of the bus message; the latency ledger is made from envelopes.
 """
 
 import struct
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from groundstation.bus.topics import Topic
@@ -22,9 +21,8 @@ class Cause(NamedTuple):
     sequence: int
 
 
-@dataclass(frozen=True, slots=True)
-class Envelope:
-    """Attributes of one published payload.
+class Envelope(NamedTuple):
+    """Attributes of one published payload; a named tuple, since thousands are made a second.
 
     Attributes:
         topic: Row of the topic table.
