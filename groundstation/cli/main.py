@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import typer
 
+from calibration.camera.errors import CalibrationFileError
 from drivers.errors import DeviceError
+from groundstation.recording.errors import RecordingError
 from groundstation.runtime.errors import GroundStationError, UsageError
 
 
@@ -77,7 +79,7 @@ def main() -> None:
     words = sys.argv[1:]
     try:
         build(words[0] if words else None)()
-    except (UsageError, DeviceError) as error:
+    except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         raise SystemExit(2) from None
     except GroundStationError as error:

@@ -16,7 +16,7 @@ from groundstation.cli.errors import UsageError
 from groundstation.cli.terminal_view import TerminalView
 from groundstation.runtime.live_run import LiveRun
 from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import check_processes
+from groundstation.runtime.node_table import check_rig
 from groundstation.runtime.report import write_report
 from groundstation.runtime.rig import load_rig
 
@@ -48,7 +48,7 @@ def run(
       groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
     loaded = load_rig(rig)
-    check_processes(loaded)
+    check_rig(loaded)
     if record is not None and record.exists():
         raise UsageError(f"{record} is already there: recordings are never overwritten")
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from calibration.camera.models import CameraCalibration
+from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.bus.journal import JournalWriter
 from groundstation.nodes.node import Node
 from groundstation.runtime import factories
@@ -95,12 +97,17 @@ def process_of(rig: Rig, row: NodeRow, vehicle: str) -> str:
     return template.replace("{vehicle}", vehicle)
 
 
-def check_processes(rig: Rig) -> None:
-    """Refuse a rig that names unknown nodes or puts a heavy node together with an urgent one.
+def check_rig(rig: Rig) -> None:
+    """Refuse a rig before anything is started: node names, placement, calibration files.
 
     Raises:
-        RigError: One sentence with the names.
+        RigError: An unknown node, or a heavy node together with an urgent one.
+        CalibrationFileError: A file of a star camera is missing or wrong.
     """
+    for mock_up in rig.mock_ups.values():
+        if mock_up.star_camera is not None:
+            CameraCalibration.load(mock_up.star_camera.camera)
+            StarCatalogue.load(mock_up.star_camera.ceiling)
     unknown = set(rig.nodes) - set(_BY_NAME)
     if unknown:
         raise RigError(f"nodes.{unknown.pop()}: no such node (there are {', '.join(_BY_NAME)})")
@@ -138,7 +145,7 @@ def build_slots(
     Raises:
         RigError: The rig's placement is refused, or a calibration file is wrong.
     """
-    check_processes(rig)
+    check_rig(rig)
     slots = []
     for row in NODES:
         for vehicle in row.vehicles(rig):

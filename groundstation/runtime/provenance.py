@@ -25,7 +25,7 @@ def recording_info(rig: Rig, rig_path: Path, seed: int | None, utc_offset_ns: in
     """Provenance of a recording of this rig."""
     return RecordingInfo(
         rig_toml=rig_path.read_text(),
-        rig_path=str(rig_path),
+        rig_path=str(rig_path.resolve()),
         images=ImagePolicy(rig.record.images),
         calibration_sha256=calibration_hashes(rig),
         seed=seed,
