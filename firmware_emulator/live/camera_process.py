@@ -7,7 +7,6 @@ ends this process. On stdout it says its port once.
 
 import json
 import os
-import signal
 import sys
 import threading
 import time
@@ -27,6 +26,7 @@ from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
 NS_PER_S = 1_000_000_000
+_MAX_ORDERS = 64  # more than a second of the slowest pipeline; behind that, old pictures give way to new ones
 
 
 class LiveCamera:
@@ -41,7 +41,7 @@ class LiveCamera:
         self._renderer = renderer
         self._jpeg_quality = jpeg_quality
         self._changed = threading.Condition()
-        self._orders: deque[Exposure] = deque()
+        self._orders: deque[Exposure] = deque(maxlen=_MAX_ORDERS)
         self._newest: tuple[int, NDArray[np.uint8]] | None = None
         self._published = 0
         threading.Thread(target=self._work, daemon=True).start()
@@ -87,8 +87,8 @@ class LiveCamera:
                 self._changed.notify_all()
 
 
-def make_server(cameras: dict[str, LiveCamera]) -> ThreadingHTTPServer:
-    """A server on a free loopback port: `/<vehicle>.raw` and `/<vehicle>.mjpeg`."""
+def make_server(cameras: dict[str, LiveCamera], port: int = 0) -> ThreadingHTTPServer:
+    """A server on a loopback port (0: a free one): `/<vehicle>.raw` and `/<vehicle>.mjpeg`."""
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
@@ -122,12 +122,11 @@ def make_server(cameras: dict[str, LiveCamera]) -> ThreadingHTTPServer:
         daemon_threads = True
         block_on_close = False
 
-    return Server((LOOPBACK, 0), Handler)
+    return Server((LOOPBACK, port), Handler)
 
 
-def main() -> int:
-    """Serve until stdin ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+def main(port: int) -> int:
+    """Serve on a port (0: a free one) until stdin ends."""
     cv2.setNumThreads(1)
     cameras: dict[str, LiveCamera] = {}
     try:
@@ -143,7 +142,7 @@ def main() -> int:
     except SceneError as error:
         print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201 - the answer to the parent
         return 2
-    server = make_server(cameras)
+    server = make_server(cameras, port)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     print(json.dumps({"port": server.server_address[1]}), flush=True)  # noqa: T201 - likewise
     for line in sys.stdin:
@@ -153,6 +152,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    status = main()
+    status = main(int(sys.argv[1]))
     sys.stdout.flush()
     os._exit(status)  # threads that wait for slow clients must not hold the process

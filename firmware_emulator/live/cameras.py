@@ -1,8 +1,10 @@
 """The camera process as its parent sees it."""
 
 import json
+import os
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -12,10 +14,14 @@ from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
 
 _GRACE_S = 0.5
+_BACK_OFF_S = 2.0
 
 
 class CameraProcess:
     """Starts the process that draws and serves pictures, and tells it what to draw.
+
+    The caller paces serial lines, so it is never made to wait: an order that the process does not take is
+    dropped, and a process that died is started again on the same port without waiting for it.
 
     Args:
         rows: One table per camera: name, ceiling, camera, exposure_s, readout_s, sky_seed, camera_seed,
@@ -23,21 +29,22 @@ class CameraProcess:
 
     Raises:
         SceneError: A file of a camera cannot be read, or the process did not start.
+
+    Attributes:
+        dropped_orders: Pictures that were not ordered because the process was dead or stuck.
+        restarts: How often it was started again.
     """
 
     def __init__(self, rows: Sequence[dict[str, object]]) -> None:
-        self._child = subprocess.Popen(
-            [sys.executable, "-m", "firmware_emulator.live.camera_process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        self._rows = list(rows)
+        self.dropped_orders = 0
+        self.restarts = 0
+        self._port = 0
+        self._child = self._start()
         try:
-            self._say(list(rows))
             answer = json.loads(self._child.stdout.readline()) if self._child.stdout else {}
-        except (OSError, ValueError) as error:
-            self.close()
-            raise SceneError("the camera process did not start") from error
+        except ValueError:
+            answer = {}
         if "port" not in answer:
             self.close()
             raise SceneError(str(answer.get("error", "the camera process did not start")))
@@ -48,27 +55,49 @@ class CameraProcess:
         return f"http://{LOOPBACK}:{self._port}/{name}.{stream}"
 
     def order(self, name: str, exposure: Exposure) -> None:
-        """Ask for a picture.
-
-        Raises:
-            OSError: The process is gone.
-        """
-        self._say([name, asdict(exposure)])
+        """Ask for a picture."""
+        if not self._say([name, asdict(exposure)]):
+            self.dropped_orders += 1
+            if self._child.poll() is not None and time.monotonic() > self._started_s + _BACK_OFF_S:
+                self._release()
+                self._child = self._start()
+                self.restarts += 1
 
     def close(self) -> None:
         """End the process; may be called twice."""
-        for pipe in (self._child.stdin, self._child.stdout):
-            if pipe:
-                with suppress(OSError):  # it died first
-                    pipe.close()
+        self._release()
         try:
             self._child.wait(_GRACE_S)
         except subprocess.TimeoutExpired:
             self._child.kill()
             self._child.wait()
 
-    def _say(self, message: object) -> None:
-        if self._child.stdin is None:
-            raise BrokenPipeError("the camera process has no stdin")
-        self._child.stdin.write(json.dumps(message) + "\n")
-        self._child.stdin.flush()
+    def _start(self) -> subprocess.Popen[bytes]:
+        self._started_s = time.monotonic()
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", "firmware_emulator.live.camera_process", str(self._port)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the parent, who ends this process by closing its stdin
+        )
+        if self._child.stdin:
+            os.set_blocking(self._child.stdin.fileno(), False)
+        self._say(self._rows)
+        return self._child
+
+    def _say(self, message: object) -> bool:
+        """Write a line whole or not at all; whether it was taken."""
+        line = (json.dumps(message) + "\n").encode()
+        pipe = self._child.stdin
+        if pipe is None or pipe.closed:
+            return False
+        try:
+            return os.write(pipe.fileno(), line) == len(line)  # a pipe takes lines below 4 kB whole
+        except OSError:
+            return False
+
+    def _release(self) -> None:
+        for pipe in (self._child.stdin, self._child.stdout):
+            if pipe:
+                with suppress(OSError):  # it died first
+                    pipe.close()

@@ -41,6 +41,7 @@ class LiveLaboratory:
         self._selector = self._stack.enter_context(selectors.SelectSelector())
         self._sinks: dict[str, Callable[[bytes], None]] = {}
         self._sessions: dict[Client, SlcanSession] = {}
+        self._ptys: dict[str, PtyPort] = {}
         self._is_stopping = False
         self.addresses: dict[str, Address] = {}
         scenario = LaboratoryConfig.model_validate(dict(config))
@@ -101,10 +102,15 @@ class LiveLaboratory:
                 self._sinks[arrival.channel](arrival.data)
         for name, exposure in self._laboratory.take_exposures():
             if self._cameras:
-                try:
-                    self._cameras.order(name, exposure)
-                except OSError:  # pictures end, the rest of the laboratory goes on
-                    self._cameras = None
+                self._cameras.order(name, exposure)
+
+    def counters(self) -> dict[str, int]:
+        """What was lost on the way to clients that did not read, by channel; and the camera process' woes."""
+        lost = {channel: pty.dropped_bytes for channel, pty in self._ptys.items()}
+        if self._cameras:
+            lost["pictures"] = self._cameras.dropped_orders
+            lost["camera_restarts"] = self._cameras.restarts
+        return lost
 
     def close(self) -> None:
         """Give every port and process back; may be called twice."""
@@ -139,7 +145,7 @@ class LiveLaboratory:
         if channel in self.addresses:
             return
         if channel.endswith("/imu"):
-            pty = PtyPort()
+            pty = self._ptys[channel] = PtyPort()
             self._stack.callback(pty.close)
             self._selector.register(pty, selectors.EVENT_READ, lambda: self._deliver(channel, pty.read()))
             self._sinks[channel], self.addresses[channel] = pty.write, pty.path

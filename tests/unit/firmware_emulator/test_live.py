@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.errors import NotFound
 from drivers.imu_block.port import SerialPort
 from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame, encode_identify
 from drivers.laboratory import parse_announcement
@@ -20,6 +21,8 @@ from drivers.star_camera.port import StarCamera
 from drivers.valve_bus.port import ValveBusPort
 from drivers.valve_bus.protocol import Arm, CanFrame, ValveStatus, decode, encode
 from firmware_emulator.__main__ import main
+from firmware_emulator.devices.star_camera import Exposure
+from firmware_emulator.live.cameras import CameraProcess
 from firmware_emulator.live.pty_port import PtyPort
 from firmware_emulator.live.server import LiveLaboratory
 from firmware_emulator.live.slcan import SlcanSession, encode_frame
@@ -102,6 +105,45 @@ def test_pictures_come_raw_and_as_jpeg(emulated_scene):
             assert max(int(picture.image.max()) for picture in pictures) > 60
             numbers = [picture.sequence for picture in pictures]
             assert numbers == sorted(set(numbers))
+
+
+@pytest.mark.slow
+def test_a_killed_camera_process_comes_back_on_its_port(emulated_scene):
+    row = {
+        "name": "alpha", "exposure_s": 0.01, "readout_s": 0.0, "jpeg_quality": 90, "sky_seed": [1],
+        "camera_seed": [2], **emulated_scene,
+    }  # fmt: skip
+    cameras = CameraProcess([row])
+    try:
+        url = cameras.url("alpha", "raw")
+        first = cameras._child
+        first.kill()
+        first.wait()
+        sequence = 0
+        while cameras.restarts == 0:
+            order_picture(cameras, sequence)
+            sequence += 1
+        with eventually_open(url) as port:
+            order_picture(cameras, sequence)
+            assert port.read(10.0).sequence == sequence
+        assert cameras.dropped_orders > 0
+    finally:
+        cameras.close()
+    assert cameras._child.returncode == 0
+
+
+def order_picture(cameras, sequence):
+    pose = (0.0, 0.0, 0.0)
+    cameras.order("alpha", Exposure(sequence, pose, pose, 0, time.monotonic_ns(), False, 0))
+
+
+def eventually_open(url):
+    deadline_s = time.monotonic() + 30.0
+    while True:
+        try:
+            return StarCamera.open(url)
+        except NotFound:
+            assert time.monotonic() < deadline_s
 
 
 @pytest.fixture
