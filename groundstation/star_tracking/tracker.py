@@ -25,6 +25,13 @@ from groundstation.star_tracking.hypotheses import (
     spot_triangles,
     triangle_poses,
 )
+from groundstation.star_tracking.motion import (
+    row_delays_s,
+    smear_from_motion,
+    smear_from_streaks,
+    to_middle_row,
+    unbend,
+)
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
 from groundstation.star_tracking.refinement import Pose, refine, spot_covariance
 from groundstation.star_tracking.sky_index import SkyIndex
@@ -47,17 +54,21 @@ class TrackerSettings:
         pair_spots: The brightest so many take part in the search by pairs.
         pair_spots_total: With more spots than this pairs are not tried.
         look_ups: Cap on tested spot positions per picture.
+        exposure_s: Of the camera; with a known motion it straightens streaks. 0: streaks tell themselves.
+        readout_s: Time from the first to the last row of a rolling shutter; 0 for a global one.
     """
 
     tolerance_px: float = 1.4
     centre_floor_px: float = 0.012
-    evidence_nats: float = 11.0
+    evidence_nats: float = 9.0
     min_stars: int = 4
     min_stars_prior: int = 3
     identified_spots: int = 60
     pair_spots: int = 12
     pair_spots_total: int = 20
     look_ups: int = 150_000
+    exposure_s: float = 0.0
+    readout_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -65,6 +76,7 @@ class _Search:
     """One picture's search: what it may still cost, and the best that it found."""
 
     look_ups_left: int
+    motion: BodyMotion | None = None
     best_nats: float = -math.inf
     tested: set[tuple[int, int, int]] = field(default_factory=set)
 
@@ -101,7 +113,6 @@ class StarTracker:
             prior: What is believed of the pose; the fix does not contain it as information.
             motion: Velocity during the exposure, for cameras with a rolling shutter.
         """
-        del motion
         n = len(spots)
         if spots.is_flooded:
             return NoFix(Refusal.FLOODED, "More of the picture is lit than a sky of stars can.", n)
@@ -111,7 +122,11 @@ class StarTracker:
         if n < needed:
             return NoFix(Refusal.TOO_FEW_STARS, f"{n} spots, a fix needs {needed}.", n)
         points = self.rays.look_up(spots.u_px, spots.v_px)
-        search = _Search(self.settings.look_ups)
+        if motion is None or self.settings.exposure_s == 0.0:
+            smear = smear_from_streaks(points.q_body_m, spots.streak_px, points.jacobian_m_px)
+            if smear is not None:
+                points = CeilingPoints(unbend(points.q_body_m, smear), points.jacobian_m_px)
+        search = _Search(self.settings.look_ups, motion)
         if prior is not None:
             fix = self._track(spots, points, prior, search)
             if fix is not None or n < self.settings.min_stars:
@@ -176,10 +191,22 @@ class StarTracker:
         sigma = math.sqrt(max(prior.cov[0, 0], prior.cov[1, 1]))
         sigma = math.hypot(sigma, 0.5 * self.rays.reach_m * math.sqrt(prior.cov[2, 2]))
         gate = min(3.0 * sigma + 2.0 * self._tolerance_m, 0.1)
-        matched = self._match(points.q_body_m, turn, shift, gate)
+        matched = self._match(self._at_middle(spots, points, turn, search), turn, shift, gate)
         if len(matched[0]) < self.settings.min_stars_prior:
             return None
         return self._settle(spots, points, turn, shift, prior, search, gate)
+
+    def _at_middle(self, spots: Spots, points: CeilingPoints, turn: complex, search: _Search) -> Complex:
+        """Give the spots as at the middle of the middle row's exposure, the motion being known."""
+        q, motion = points.q_body_m, search.motion
+        if motion is None:
+            return q
+        if self.settings.exposure_s > 0.0:
+            q = unbend(q, smear_from_motion(motion, self.settings.exposure_s, turn))
+        if self.settings.readout_s > 0.0:
+            delay = row_delays_s(spots.v_px, self.rays.camera.height, self.settings.readout_s)
+            q = to_middle_row(q, delay, motion, turn)
+        return q
 
     def _match(self, q: Complex, turn: complex, shift: complex, gate_m: float) -> tuple[Index, Index]:
         """Give (spot, star) within the gate; of two spots at one star the nearer one."""
@@ -206,12 +233,13 @@ class StarTracker:
         gate_m: float | None = None,
     ) -> StarFix | None:
         """Refine one candidate with a shrinking gate and put it to the test."""
-        q = points.q_body_m
         gate = gate_m or 2.5 * self._tolerance_m
         needed = self.settings.min_stars if prior is None else self.settings.min_stars_prior
         pose: Pose | None = None
         spot = star = np.zeros(0, np.int64)
+        q = points.q_body_m
         for _ in range(3):
+            q = self._at_middle(spots, points, turn, search)
             spot, star = self._match(q, turn, shift, gate)
             if len(spot) < needed:
                 return None
