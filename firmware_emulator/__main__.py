@@ -9,13 +9,20 @@ import os
 import signal
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from firmware_emulator.live.server import LiveLaboratory
 from firmware_emulator.sky.scene import SceneError
+
+_ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+
+
+class _Ended(BaseException):
+    """A signal came before there was a laboratory to stop."""
 
 
 class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters
@@ -49,22 +56,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("rig", type=Path, help="rig file (TOML) with a table [laboratory]")
     parser.add_argument("--seed", type=int, default=0, help="decides every random number (default 0)")
     options = parser.parse_args(arguments)
-    try:
-        laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
-    except ValidationError as error:
-        return _refuse(f"{options.rig}: {sentence(error)}")
-    except (_BadRig, SceneError) as error:
-        return _refuse(str(error))
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, lambda *_: laboratory.stop())
-    try:
-        laboratory.watch_parent()
-        sys.stdout.write(laboratory.announcement())
-        sys.stdout.flush()
-        laboratory.run()
-    finally:
-        laboratory.close()
+    with _signals(_end):
+        try:
+            laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
+        except ValidationError as error:
+            return _refuse(f"{options.rig}: {sentence(error)}")
+        except (_BadRig, SceneError) as error:
+            return _refuse(str(error))
+        except _Ended:
+            return 0
+        try:
+            with _signals(lambda *_: laboratory.stop()):
+                laboratory.watch_parent()
+                sys.stdout.write(laboratory.announcement())
+                sys.stdout.flush()
+                laboratory.run()
+        except (_Ended, BrokenPipeError):  # nobody listens to the announcement any more
+            return 0
+        finally:
+            laboratory.close()
     return 0
+
+
+@contextmanager
+def _signals(handler: Callable[..., None]) -> Iterator[None]:
+    """Let a handler have the signals that end us, for a while."""
+    before = {number: signal.signal(number, handler) for number in _ENDING}
+    try:
+        yield
+    finally:
+        for number, previous in before.items():
+            signal.signal(number, previous)
+
+
+def _end(*_: object) -> None:
+    raise _Ended
 
 
 def _refuse(complaint: str) -> int:

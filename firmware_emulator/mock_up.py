@@ -6,17 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_emulator.config import CameraConfig, ImuConfig, TableConfig, VehicleConfig
-from firmware_emulator.devices.imu_block import GYRO_START_NS, ImuBlock, WarmUp
-from firmware_emulator.devices.imu_sensors import ImuSensors, SensorErrors, noise_figures
+from firmware_emulator.config import TableConfig
+from firmware_emulator.devices.imu_block import GYRO_START_NS, ImuBlock
+from firmware_emulator.devices.imu_sensors import ImuSensors
 from firmware_emulator.devices.pose_streams import FixErrors, FixStream, TruthStream
+from firmware_emulator.devices.sensor_errors import SensorErrors, WarmUp, noise_figures
 from firmware_emulator.devices.serial_line import SerialLine
 from firmware_emulator.devices.star_camera import StarCamera
 from firmware_emulator.devices.valve_node import ValveNode
 from firmware_emulator.faults import Faults
+from firmware_emulator.mock_up_config import CameraConfig, ImuConfig, VehicleConfig
 from firmware_emulator.plant.air_table import FloorPulses, Surface
+from firmware_emulator.plant.body import Body
 from firmware_emulator.plant.motion_state import Motion, PollGrid
-from firmware_emulator.plant.rigid_body import Body, Vehicle
+from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import GasSupply, Nozzle, ThrusterBank, ValveTiming
 
 Random = Callable[[str], np.random.Generator]

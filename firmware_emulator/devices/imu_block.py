@@ -4,7 +4,6 @@ Power-up as on the real thing: a garbage byte while the transmitter's pin comes 
 start, then frames with the sequence from 1 and the tick from 0. A reset does the same again.
 """
 
-import math
 from collections import deque
 
 import numpy as np
@@ -31,16 +30,12 @@ from drivers.imu_block.protocol import (
     encode_v1,
     encode_v2,
 )
-from firmware_emulator.devices.imu_sensors import (
-    GYRO_NULL,
-    GYRO_SELF_TEST_COUNTS,
-    TILT_SELF_TEST_CODE,
-    Disturbances,
-    ImuSensors,
-)
+from firmware_emulator.devices.ailments import Ailments
+from firmware_emulator.devices.imu_sensors import Disturbances, ImuSensors
+from firmware_emulator.devices.sensor_errors import WarmUp
 from firmware_emulator.devices.serial_line import PACKET_BYTES, SerialLine
 from firmware_emulator.faults import Faults
-from firmware_emulator.plant.motion_state import Felt, PollGrid
+from firmware_emulator.plant.motion_state import PollGrid, last_polls
 from firmware_emulator.plant.rigid_body import Vehicle
 
 GYRO_START_NS = 35_000_000  # ADIS16100 data sheet
@@ -48,21 +43,9 @@ FRAME_DELAY_NS = 500_000  # from the tick's edge to the first start bit: 0.39 ms
 TRANSMITTER_UP_NS = 1_000_000
 GARBAGE = b"\xf8"  # a rising pin read as a start bit
 FIRMWARE = (1, 0)
-OUT_OF_WINDOW_CODE = 2047.0  # SCA103T: parity or connection failure forces the output to a rail
 _GYRO_TEMPERATURE_PER_K = 1.0 / 0.1453  # ADIS16100: 0.1453 deg C per LSB, 2048 at 25 deg C
 _HOUSEKEEPING_ITEMS = 4
 _COMMAND_TYPE = {SetAveraging: 0x42, SelfTest: 0x43, Reset: 0x44}  # docs/interfaces/imu_block.md
-
-
-class WarmUp:
-    """Temperature of the block: one state that rises to its own heat above the room's."""
-
-    def __init__(self, ambient_c: float, rise_k: float, time_constant_s: float) -> None:
-        self._ambient_c, self._rise_k, self._tau_s = ambient_c, rise_k, time_constant_s
-
-    def at(self, seconds_on: float) -> float:
-        """Temperature in deg C, so long after power-up."""
-        return self._ambient_c - self._rise_k * math.expm1(-seconds_on / self._tau_s)
 
 
 class ImuBlock:
@@ -101,14 +84,12 @@ class ImuBlock:
         self._version, self._own_averaging = frame_version, averaging
         self._averaging = self._window = averaging
         self._serial_number = serial_number
-        self._warm_up, self._faults, self._rng = warm_up, faults, rng
-        self._is_faulty = faults.has("stuck_gyro") or faults.has("dead_tilt")
+        self._warm_up, self._rng = warm_up, rng
+        self._ailments = Ailments(faults)
         self._start_ns = start_ns
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._commands = CommandParser()
         self._refused = 0
-        self._held_gyro_code = GYRO_NULL
-        self._self_test = (SelfTestChannel(0), 0)  # channels, last poll
         self._boot_poll = 0
         self._window_end = averaging
         self._frames = 0
@@ -152,10 +133,10 @@ class ImuBlock:
         stamp_ns = self._frame_ns
         self._vehicle.advance(stamp_ns)
         temperature_c = self._warm_up.at((stamp_ns - self._start_ns) / 1e9)
-        disturbances = self._disturbances(stamp_ns)
-        felt = _last_polls(self._vehicle.take_felt(), self._window)
+        disturbances = self._ailments.at(stamp_ns - self._start_ns, self._window_end)
+        felt = last_polls(self._vehicle.take_felt(), self._window)
         gyro, tilts = self._sensors.average(felt, temperature_c, disturbances)
-        self._held_gyro_code = round(gyro)
+        self._ailments.held_gyro_code = round(gyro)
         self._frames += 1
         if self._version == 1:
             frame = encode_v1(
@@ -181,36 +162,11 @@ class ImuBlock:
         self._window_end = last_poll + self._window
         self._frame_ns = self._grid.stamp_ns(self._window_end)
 
-    def _disturbances(self, stamp_ns: int) -> Disturbances | None:
-        channels, last_poll = self._self_test
-        if not (self._is_faulty or channels):
-            return None
-        if channels and self._window_end > last_poll:
-            channels = SelfTestChannel(0)
-            self._self_test = (channels, 0)
-        disturbances = Disturbances()
-        if channels & SelfTestChannel.GYRO_POSITIVE:
-            disturbances.gyro_add_counts += GYRO_SELF_TEST_COUNTS
-        if channels & SelfTestChannel.GYRO_NEGATIVE:
-            disturbances.gyro_add_counts -= GYRO_SELF_TEST_COUNTS
-        for channel, bit in enumerate(_TILT_TESTS):
-            if channels & bit:
-                disturbances.forced_tilts[channel] = TILT_SELF_TEST_CODE
-        age_ns = stamp_ns - self._start_ns
-        stuck = self._faults.active("stuck_gyro", age_ns)
-        if stuck:
-            code = stuck.parameters["code"]
-            disturbances.gyro_stuck_code = self._held_gyro_code if math.isnan(code) else round(code)
-        for dead in self._faults.all_active("dead_tilt", age_ns):
-            first = 2 * int(dead.parameters["axis"])
-            disturbances.forced_tilts.update({first: OUT_OF_WINDOW_CODE, first + 1: OUT_OF_WINDOW_CODE})
-        return disturbances
-
     def _status(self, disturbances: Disturbances | None, tilts: tuple[float, ...]) -> Status:
         status = self._reset_cause
         if disturbances is None:
             return status
-        if self._self_test[0]:
+        if self._ailments.is_testing:
             return status | Status.SELF_TEST
         # The firmware knows a dead chip by its codes alone; a stuck gyro it cannot see.
         if max(tilts[:2]) > _WINDOW_TOP:
@@ -245,7 +201,7 @@ class ImuBlock:
                 self._averaging = sample_count  # the window under way keeps its length and its count
                 reply = Ack(tag, _COMMAND_TYPE[SetAveraging], AckResult.DONE)
             case SelfTest(tag, channels, duration_ms):
-                self._self_test = (SelfTestChannel(channels), poll + duration_ms)
+                self._ailments.test(SelfTestChannel(channels), poll + duration_ms)
                 reply = Ack(tag, _COMMAND_TYPE[SelfTest], AckResult.DONE)
             case Reset(tag):
                 reply = Ack(tag, _COMMAND_TYPE[Reset], AckResult.DONE)
@@ -259,7 +215,7 @@ class ImuBlock:
     def _restart(self, stamp_ns: int) -> None:
         """Back to the first line of the firmware; polls until the gyro may be trusted are lost."""
         self._boot_poll = self._grid.last_poll(stamp_ns + GYRO_START_NS)
-        self._self_test = (SelfTestChannel(0), 0)
+        self._ailments.test(SelfTestChannel(0), 0)
         self._frames, self._refused = 0, 0
         self._averaging = self._own_averaging
         self._reset_cause = Status.RESET_WATCHDOG
@@ -268,22 +224,5 @@ class ImuBlock:
         self._begin_window(self._boot_poll)
 
 
-def _last_polls(felt: list[Felt], polls: int) -> list[Felt]:
-    """The last polls of what was felt: after a restart the block missed those before."""
-    surplus = sum(part.polls for part in felt) - polls
-    while surplus > 0:
-        first = felt[0]
-        dropped = min(surplus, first.polls)
-        felt = felt[1:] if dropped == first.polls else [first.without_first(dropped), *felt[1:]]
-        surplus -= dropped
-    return felt
-
-
-_TILT_TESTS = (
-    SelfTestChannel.TILT_X_X,
-    SelfTestChannel.TILT_X_Y,
-    SelfTestChannel.TILT_Y_X,
-    SelfTestChannel.TILT_Y_Y,
-)
 _WINDOW_TOP = 1945  # SCA103T: upper end of the output's normal range, 4.75 V
 _ATTENTION = Status.FAULT_GYRO | Status.FAULT_TILT_X | Status.FAULT_TILT_Y | Status.SELF_TEST

@@ -45,6 +45,9 @@ class CameraProcess:
             answer = json.loads(self._child.stdout.readline()) if self._child.stdout else {}
         except ValueError:
             answer = {}
+        except BaseException:  # somebody wants us to end before it is up
+            self.close()
+            raise
         if "port" not in answer:
             self.close()
             raise SceneError(str(answer.get("error", "the camera process did not start")))

@@ -83,8 +83,9 @@ class Contacts:
             normal_x, normal_y = (dx / distance_m, dy / distance_m) if distance_m > 0.0 else (1.0, 0.0)
             closing_m_s = closing_x * normal_x + closing_y * normal_y
             if closing_m_s > 0.0 and self._begin((index, other_index), one.now_ns):
-                mass_a, mass_b = one.body.mass_kg, other.body.mass_kg
-                reduced_kg = mass_a * mass_b / (mass_a + mass_b)
+                # Dry friction holds a landed vehicle like a wall.
+                give = (one.is_floating / one.body.mass_kg) + (other.is_floating / other.body.mass_kg)
+                reduced_kg = 1.0 / give if give > 0.0 else 0.0
                 impulse = (1.0 + self._contact_restitution) * reduced_kg * closing_m_s
                 one.push(impulse * normal_x, impulse * normal_y, SQUEEZE_NS)
                 other.push(-impulse * normal_x, -impulse * normal_y, SQUEEZE_NS)

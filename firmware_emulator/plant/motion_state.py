@@ -59,6 +59,17 @@ class Felt:
         return Felt(self.polls - polls, rate, x, y)
 
 
+def last_polls(felt: list[Felt], polls: int) -> list[Felt]:
+    """The last polls of what was felt: a block that restarts misses those before."""
+    surplus = sum(part.polls for part in felt) - polls
+    while surplus > 0:
+        first = felt[0]
+        dropped = min(surplus, first.polls)
+        felt = felt[1:] if dropped == first.polls else [first.without_first(dropped), *felt[1:]]
+        surplus -= dropped
+    return felt
+
+
 class PollGrid:
     """Moments at which a microcontroller polls its sensors: its crystal's kHz, not the host's.
 

@@ -7,49 +7,17 @@ beyond the middle heading (4e-6 of the force at 1 rad/s), the change of drag and
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_emulator.plant.air_table import GRAVITY_M_S2, FloorPulses, Surface
+from firmware_emulator.plant.air_table import FloorPulses, Surface
+from firmware_emulator.plant.body import Body, DryFriction, Push
 from firmware_emulator.plant.motion_state import Felt, Motion, PollGrid
 from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S, ThrusterBank
 
 _LONGEST_PIECE_NS = 10_000_000
 _LONGEST_SLIDE_NS = 1_000_000  # dry friction turns with the velocity and ends abruptly
 _SAME_SLOPE_M = 5e-4  # over which a wave of 0.8 m and 0.05 mrad changes the slope by 2 um/s^2
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """What does not change about a vehicle.
-
-    Attributes:
-        mass_kg: Mass.
-        inertia_kg_m2: About the vertical through the centre of mass.
-        centre_of_mass_body_m: In body axes from the body's origin.
-        imu_body_m: Place of the accelerometers in body axes from the body's origin.
-        radius_m: Of the bumper around the body's origin.
-        drag_n_s_m: Air drag force per speed.
-        drag_nm_s: Air drag torque per rate.
-    """
-
-    mass_kg: float = 11.0
-    inertia_kg_m2: float = 0.25
-    centre_of_mass_body_m: tuple[float, float] = (0.0, 0.0)
-    imu_body_m: tuple[float, float] = (0.0, 0.0)
-    radius_m: float = 0.2
-    drag_n_s_m: float = 0.0
-    drag_nm_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Push:
-    """A force on the centre of mass, table frame, until a moment: a bumper being squeezed."""
-
-    fx_n: float
-    fy_n: float
-    end_ns: int
 
 
 class Vehicle:
@@ -88,15 +56,13 @@ class Vehicle:
         self._imu_from_com_m = (body.imu_body_m[0] - com_x, body.imu_body_m[1] - com_y)
         self.motion = origin.of_point(body.centre_of_mass_body_m)
         self._surface, self._floor = surface, floor
-        self._friction_m_s2 = friction_landed * GRAVITY_M_S2
-        # Friction spread over the bumper's disc resists turning with 2/3 of its radius as arm.
-        self._friction_rad_s2 = self._friction_m_s2 * body.mass_kg * body.radius_m / 1.5 / body.inertia_kg_m2
+        self._friction = DryFriction(friction_landed, body)
         self._polls = polls
         self._poll = polls.last_poll(start_ns)
         self._ramp = np.arange(16, dtype=np.float64)
         self._float_change_ns = FAR_FUTURE_NS
         self._float_wanted = is_floating
-        self._pushes: list[_Push] = []
+        self._pushes: list[Push] = []
         self._slope_at = (math.inf, math.inf)
         self._slope = (0.0, 0.0)
         self._felt: list[Felt] = []
@@ -110,7 +76,7 @@ class Vehicle:
     def push(self, impulse_x_n_s: float, impulse_y_n_s: float, duration_ns: int) -> None:
         """Give the centre of mass an impulse (table frame) spread evenly over a duration from now."""
         force = NS_PER_S / duration_ns
-        self._pushes.append(_Push(impulse_x_n_s * force, impulse_y_n_s * force, self.now_ns + duration_ns))
+        self._pushes.append(Push(impulse_x_n_s * force, impulse_y_n_s * force, self.now_ns + duration_ns))
 
     def advance(self, until_ns: int) -> None:
         """Move on to `until_ns`, which is not before now."""
@@ -131,7 +97,8 @@ class Vehicle:
 
         Advances only where one does: so looking does not change what the vehicle does by a bit less.
         """
-        if stamp_ns > self._next_event_ns() or stamp_ns > self.now_ns + _LONGEST_PIECE_NS:
+        is_eventful = stamp_ns > self._next_event_ns() or (not self.is_floating and self._is_sliding())
+        if is_eventful or stamp_ns > self.now_ns + _LONGEST_PIECE_NS:
             self.advance(stamp_ns)
         if stamp_ns == self.now_ns or not self.is_floating:
             return self.motion.of_point(self._origin_from_com_m)
@@ -265,7 +232,9 @@ class Vehicle:
     def _stand(self, duration_s: float, end_ns: int) -> None:
         """Landed: dry friction holds it, or stops it if it still slides. The valves cannot move it."""
         now = self.motion
-        ax, ay = self._slide(duration_s) if self._is_sliding() else (0.0, 0.0)
+        ax = ay = 0.0
+        if self._is_sliding():
+            self.motion, (ax, ay) = self._friction.slide(now, duration_s)
         self._refresh_slope()
         glide_x, glide_y = self._gliding_acceleration()
         count = self._polls_until(end_ns)
@@ -278,21 +247,3 @@ class Vehicle:
             force_y = cosine * felt_y - sine * felt_x - square * arm_y
             self._felt.append(Felt(count, now.rate_rad_s, force_x, force_y))
         self.thrusters.relax(duration_s)
-
-    def _slide(self, duration_s: float) -> tuple[float, float]:
-        """Slow down by dry friction; return the acceleration, table frame."""
-        now = self.motion
-        speed_m_s = math.hypot(now.vx_m_s, now.vy_m_s)
-        kept = max(0.0, 1.0 - self._friction_m_s2 * duration_s / speed_m_s) if speed_m_s > 0.0 else 0.0
-        slowed = max(0.0, abs(now.rate_rad_s) - self._friction_rad_s2 * duration_s)
-        rate = math.copysign(slowed, now.rate_rad_s)
-        vx, vy = kept * now.vx_m_s, kept * now.vy_m_s
-        self.motion = Motion(
-            now.x_m + 0.5 * (now.vx_m_s + vx) * duration_s,
-            now.y_m + 0.5 * (now.vy_m_s + vy) * duration_s,
-            now.heading_rad + 0.5 * (now.rate_rad_s + rate) * duration_s,
-            vx,
-            vy,
-            rate,
-        )
-        return (vx - now.vx_m_s) / duration_s, (vy - now.vy_m_s) / duration_s

@@ -225,6 +225,14 @@ def test_a_wrong_scenario_names_its_key(change, key):
     assert ".".join(map(str, raised.value.errors()[0]["loc"])) == key
 
 
+@pytest.mark.parametrize(
+    ("start_m", "complaint"), [([9.0, 0.0], "'beta'.*outside"), ([0.1, 0.0], "'alpha' and 'beta'.*overlap")]
+)
+def test_vehicles_start_on_the_table_and_apart(start_m, complaint):
+    with pytest.raises(ValidationError, match=complaint):
+        EmulatedLaboratory({"vehicles": [{"name": "alpha"}, {"name": "beta", "start_m": start_m}]})
+
+
 def test_nothing_can_be_sent_into_the_past_or_into_nowhere():
     laboratory = EmulatedLaboratory(scenario(), seed=1)
     laboratory.advance(S)

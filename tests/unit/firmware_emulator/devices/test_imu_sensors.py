@@ -9,10 +9,8 @@ from firmware_emulator.devices.imu_sensors import (
     Disturbances,
     FirstOrder,
     ImuSensors,
-    NoiseFigures,
-    SensorErrors,
-    noise_figures,
 )
+from firmware_emulator.devices.sensor_errors import NoiseFigures, SensorErrors, noise_figures
 from firmware_emulator.plant.motion_state import Felt
 
 DEG_S = math.radians(1.0)

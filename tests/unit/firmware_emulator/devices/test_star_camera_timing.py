@@ -4,8 +4,9 @@ import pytest
 from firmware_emulator.devices.star_camera import StarCamera
 from firmware_emulator.faults import Fault, Faults
 from firmware_emulator.plant.air_table import FloorPulses, Surface
+from firmware_emulator.plant.body import Body
 from firmware_emulator.plant.motion_state import Motion, PollGrid
-from firmware_emulator.plant.rigid_body import Body, Vehicle
+from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import GasSupply, ThrusterBank, ValveTiming
 
 MS = 1_000_000

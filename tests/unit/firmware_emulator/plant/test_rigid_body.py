@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_emulator.plant.air_table import GRAVITY_M_S2, FloorPulses, Surface
+from firmware_emulator.plant.body import Body
 from firmware_emulator.plant.contacts import Contacts
 from firmware_emulator.plant.motion_state import Motion, PollGrid
-from firmware_emulator.plant.rigid_body import Body, Vehicle
+from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import GasSupply, Nozzle, ThrusterBank, ValveTiming
 
 MS = 1_000_000
@@ -245,3 +246,11 @@ def test_waviness_has_the_stated_size():
         surface = Surface(LEVEL, 1e-4, 0.8, np.random.default_rng(seed))
         gradients += [surface.gradient(x, y) for x in np.linspace(-2, 2, 12) for y in np.linspace(-2, 2, 12)]
     assert np.std(gradients, axis=0) == pytest.approx([1e-4, 1e-4], rel=0.15)
+
+
+def test_a_landed_vehicle_is_a_wall_to_one_that_glides_into_it():
+    gliding = vehicle(Motion(-0.6, 0.0, 0.0, 0.1, 0.0, 0.0))
+    landed = vehicle(Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), floating=False)
+    fly_with_contacts([gliding, landed], 4 * S, Contacts((-2, 2, -2, 2), 0.5, 0.5))
+    assert gliding.motion.vx_m_s == pytest.approx(-0.05, rel=1e-9)
+    assert landed.motion == RESTING

@@ -1,0 +1,66 @@
+"""What deflects the sensors' codes beside motion: self-tests that the host asked for, and faults."""
+
+import math
+
+from drivers.imu_block.protocol import SelfTestChannel
+from firmware_emulator.devices.imu_sensors import GYRO_NULL, Disturbances
+from firmware_emulator.faults import Faults
+
+OUT_OF_WINDOW_CODE = 2047.0  # SCA103T: parity or connection failure forces the output to a rail
+GYRO_SELF_TEST_COUNTS = 221.0  # ADIS16100: 270 mV over 1.2207 mV
+TILT_SELF_TEST_CODE = 1900.0  # SCA103T: "near full scale"
+_TILT_TESTS = (
+    SelfTestChannel.TILT_X_X,
+    SelfTestChannel.TILT_X_Y,
+    SelfTestChannel.TILT_Y_X,
+    SelfTestChannel.TILT_Y_Y,
+)
+
+
+class Ailments:
+    """Self-test and faults of one block.
+
+    Args:
+        faults: `stuck_gyro`, `dead_tilt`.
+
+    Attributes:
+        held_gyro_code: The last code of the gyro, which a stuck one repeats.
+    """
+
+    def __init__(self, faults: Faults) -> None:
+        self._faults = faults
+        self._is_faulty = faults.has("stuck_gyro") or faults.has("dead_tilt")
+        self._channels, self._last_poll = SelfTestChannel(0), 0
+        self.held_gyro_code = round(GYRO_NULL)
+
+    @property
+    def is_testing(self) -> bool:
+        """Whether a self-test runs."""
+        return bool(self._channels)
+
+    def test(self, channels: SelfTestChannel, last_poll: int) -> None:
+        """Deflect channels up to a poll; no channels end a running test."""
+        self._channels, self._last_poll = channels, last_poll
+
+    def at(self, age_ns: int, window_end: int) -> Disturbances | None:
+        """What disturbs the window that ends with poll `window_end`, `age_ns` after power-up."""
+        if not (self._is_faulty or self._channels):
+            return None
+        if window_end > self._last_poll:
+            self._channels = SelfTestChannel(0)
+        disturbances = Disturbances()
+        if self._channels & SelfTestChannel.GYRO_POSITIVE:
+            disturbances.gyro_add_counts += GYRO_SELF_TEST_COUNTS
+        if self._channels & SelfTestChannel.GYRO_NEGATIVE:
+            disturbances.gyro_add_counts -= GYRO_SELF_TEST_COUNTS
+        for channel, bit in enumerate(_TILT_TESTS):
+            if self._channels & bit:
+                disturbances.forced_tilts[channel] = TILT_SELF_TEST_CODE
+        stuck = self._faults.active("stuck_gyro", age_ns)
+        if stuck:
+            code = stuck.parameters["code"]
+            disturbances.gyro_stuck_code = self.held_gyro_code if math.isnan(code) else round(code)
+        for dead in self._faults.all_active("dead_tilt", age_ns):
+            first = 2 * int(dead.parameters["axis"])
+            disturbances.forced_tilts.update({first: OUT_OF_WINDOW_CODE, first + 1: OUT_OF_WINDOW_CODE})
+        return disturbances
