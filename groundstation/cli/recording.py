@@ -9,7 +9,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from groundstation.bus.topics import topic_named
 from groundstation.cli.errors import UsageError
+from groundstation.recording.causes import CauseIndex, Reference
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
@@ -54,6 +56,46 @@ def recover(
         print(f"{found.damaged_chunks} damaged chunks were left out")
     if found.orphans:
         print(f"{found.orphans} messages were left out: their channel stood in a damaged chunk")
+
+
+@app.command()
+def causes(
+    file: Annotated[Path, typer.Argument(help="Recording (.mcap).")],
+    vehicle: Annotated[str, typer.Argument(help="Vehicle, or process for topics that processes own.")],
+    topic: Annotated[str, typer.Argument(help="Topic, e.g. valve_command.")],
+    sequence: Annotated[int, typer.Argument(help="Number of the message, from 1.")],
+) -> None:
+    """Name all that a message was made from, back to bytes and light, with its age.
+
+    Example: groundstation recording causes run.mcap alpha valve_command 1000
+    """
+    try:
+        row = topic_named(topic)
+    except KeyError:
+        raise UsageError(f"no topic is called {topic!r}; `groundstation recording info` lists them") from None
+    with Recording(file) as found:
+        index = CauseIndex(found)
+    wanted = Reference(row.index, vehicle, sequence)
+    told_ns = index[wanted].told_ns
+    table = Table(box=None, pad_edge=False)
+    for heading, width in (("back", 4), ("message", 24), ("number", 6), ("made by", 21)):
+        table.add_column(heading, no_wrap=True, min_width=width)
+    table.add_column("age / ms", justify="right")
+    table.add_column("took / ms", justify="right")
+    for steps, origin in index.chain(wanted):
+        reference = origin.message
+        name = f"{reference.owner}/{reference.topic.noun}".removeprefix("/")
+        age_ms, took_ms = (told_ns - origin.told_ns) * 1e-6, origin.wall_ns * 1e-6
+        made_by = origin.node or "a port"
+        table.add_row(
+            str(steps),
+            name,
+            str(reference.sequence),
+            made_by,
+            f"{age_ms:.2f}",
+            f"{took_ms:.2f}" if took_ms else "",
+        )
+    Console().print(table)
 
 
 def _recovered_name(file: Path) -> Path:
