@@ -52,7 +52,7 @@ def read_folder(folder: Path) -> FusionFolder:
     """
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder with imu.csv, stars.csv and meta.json.")
-    known = _read_known(folder / "meta.json")
+    known = read_known(folder / "meta.json")
     imu = read_table(folder / "imu.csv", IMU_COLUMNS)
     stars = read_table(folder / "stars.csv", STAR_COLUMNS)
     # a stamp that is no number sorts to the end, where it is refused with a reason
@@ -80,7 +80,12 @@ def noise_of(known: dict[str, Any]) -> NoiseModel:
     )
 
 
-def _read_known(path: Path) -> dict[str, Any]:
+def read_known(path: Path) -> dict[str, Any]:
+    """Read and check the `known` block of a meta.json.
+
+    Raises:
+        UsageError: a key is missing or wrong.
+    """
     try:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -17,13 +17,22 @@ class OffsetFit:
     mu_m_s2: float
     nu_m_s2: float
     cov: Array
-    """(2, 2) by the scatter of the residuals, m^2/s^4."""
+    """(2, 2) m^2/s^4: the fixes' sigma through the fit and through the start's finite difference, widened by
+    the residual where that is larger than the fixes explain."""
     residual_rms_m: float
     fixes: int
+    residual_m: Array
+    """(2, m - 1) of the fixes after the first."""
 
 
 def fit_offsets(
-    end_s: Array, span_s: Array, heading_rad: Array, force_body: Array, fix_s: Array, fix_xy_m: Array
+    end_s: Array,
+    span_s: Array,
+    heading_rad: Array,
+    force_body: Array,
+    fix_s: Array,
+    fix_xy_m: Array,
+    fix_sigma_m: float,
 ) -> OffsetFit:
     """Fit (mu, nu) such that the doubly integrated acceleration passes through the fixes.
 
@@ -37,6 +46,7 @@ def fit_offsets(
         force_body: (2, n) accelerometer readings, body axes, m/s^2.
         fix_s: (m,) exposures, ascending, within the packets, in s.
         fix_xy_m: (2, m) positions of the IMU point, table frame.
+        fix_sigma_m: of a position, per axis.
 
     Raises:
         ValueError: fewer than four fixes, or a stretch over which the offsets cannot be told.
@@ -67,5 +77,15 @@ def fit_offsets(
         raise ValueError(msg)
     found = np.linalg.solve(normal, A.T @ b)
     left = b - A @ found
-    cov = np.linalg.inv(normal) * float(left @ left) / max(1, len(b) - 2)
-    return OffsetFit(float(found[0]), float(found[1]), cov, float(np.sqrt(np.mean(left**2))), len(fix_s))
+    # y_k = e_k - e_0 - (e_1 - e_0) t_k / t_1: the start's two fixes sit in every residual
+    m = len(fix_s)
+    noise = np.zeros((m - 1, m))
+    noise[:, 1:] = np.eye(m - 1)
+    noise[:, 0] = elapsed[1:] / elapsed[1] - 1.0
+    noise[:, 1] -= elapsed[1:] / elapsed[1]
+    gain = np.linalg.solve(normal, A.T) @ np.kron(np.eye(2), noise)
+    expected = np.trace(noise @ noise.T) / (m - 1) * fix_sigma_m**2
+    widening = max(1.0, float(np.mean(left**2)) / expected)
+    cov = gain @ gain.T * fix_sigma_m**2 * widening
+    rms = float(np.sqrt(np.mean(left**2)))
+    return OffsetFit(float(found[0]), float(found[1]), cov, rms, len(fix_s), left.reshape(2, -1))

@@ -192,7 +192,9 @@ class ReintegrationEstimator:
         heading = flight[0][3] + turned - np.interp(t[0], segment.end_s, turned) - 0.5 * step
         force = np.array([segment.ax_m_s2, segment.ay_m_s2])
         points = np.array([[f[1] for f in flight], [f[2] for f in flight]])
-        fit = fit_offsets(segment.end_s, segment.span_s, heading, force, t, points)
+        fit = fit_offsets(
+            segment.end_s, segment.span_s, heading, force, t, points, self.noise.star_sigma_xy_m
+        )
         self._offsets[1:] = fit.mu_m_s2, fit.nu_m_s2
 
     @staticmethod

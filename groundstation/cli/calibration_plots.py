@@ -1,0 +1,103 @@
+"""Figures of calibrations; matplotlib loads only when one is asked for."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from calibration.imu.allan import AllanDeviation
+from calibration.imu.gyro_scale import GyroScale
+from calibration.imu.temperature import TemperatureSlope
+from calibration.imu.zero_offset import ZeroOffset
+from groundstation.cli.errors import UsageError
+
+Array = NDArray[np.float64]
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write a PNG whole or not at all."""
+    FigureCanvasAgg(figure)
+    figure.set_layout_engine("constrained")
+    part = path.with_name(f".{path.name}.part")
+    try:
+        figure.savefig(part, format="png", dpi=110)
+        os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}.") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _axes(figure: Figure, rows: int) -> list[Any]:
+    return list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
+
+
+def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
+    """Draw the rest's packets (n, 5), its mean, and what was cut out."""
+    figure = Figure(figsize=(9, 7))
+    for k, (axes, label) in enumerate(
+        zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
+    ):
+        axes.plot(rest[:, 0], rest[:, k + 1], ".", markersize=2, color="0.5")
+        axes.axhline(found.mean[k], color="tab:blue")
+        reach = 6.0 * found.packet_sigma[k]
+        axes.set_ylim(found.mean[k] - reach, found.mean[k] + reach)
+        axes.set_ylabel(label)
+        for cut in found.disturbances:
+            axes.axvspan(cut.start_s - 0.02, cut.end_s + 0.02, color="tab:red", alpha=0.3)
+    axes.set_xlabel("time, s")
+    _save(figure, path)
+
+
+def plot_temperature(found: TemperatureSlope, path: Path) -> None:
+    """Draw block means against temperature with the fitted lines."""
+    figure = Figure(figsize=(8, 7))
+    heat = found.block_temperature_c
+    for k, (axes, label) in enumerate(
+        zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
+    ):
+        axes.plot(heat, found.block_mean[:, k], ".", color="0.4")
+        axes.plot(heat, found.at_reference[k] + found.slope[k] * (heat - found.reference_c), color="tab:blue")
+        axes.set_ylabel(label)
+        axes.set_title(f"{found.slope[k]:.3g} ± {found.slope_std[k]:.1g} per °C", fontsize=9)
+    axes.set_xlabel("temperature, °C")
+    _save(figure, path)
+
+
+def plot_scale(found: GyroScale, path: Path) -> None:
+    """Draw the heading residuals of the turns."""
+    figure = Figure(figsize=(8, 4))
+    (axes,) = _axes(figure, 1)
+    residual = np.degrees(found.residual_rad)
+    axes.plot(found.fix_s[found.is_used], residual[found.is_used], ".", label=f"{found.used} used")
+    limit = 1.5 * float(np.abs(residual[found.is_used]).max()) + 1e-6
+    refused = ~found.is_used
+    clipped = np.clip(residual[refused], -limit, limit)
+    axes.plot(found.fix_s[refused], clipped, "x", color="tab:red", label=f"{found.refused} refused")
+    axes.set_xlabel("exposure, s")
+    axes.set_ylabel("star heading less gyro, °")
+    axes.legend()
+    _save(figure, path)
+
+
+def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: Path) -> None:
+    """Draw the Allan deviations with their white-noise slopes."""
+    figure = Figure(figsize=(8, 8))
+    for axes, (name, curve) in zip(_axes(figure, len(curves)), curves.items(), strict=True):
+        axes.errorbar(curve.tau_s, curve.deviation, curve.std, fmt=".-", markersize=3, linewidth=0.8)
+        axes.plot(
+            curve.tau_s, curve.random_walk / np.sqrt(curve.tau_s), "--", color="0.5", label="white noise"
+        )
+        axes.axhline(curve.bias_instability * 0.664, color="tab:red", linewidth=0.8, label="lowest")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylabel(f"{name}, {units[name]}")
+        axes.legend(fontsize=8)
+    axes.set_xlabel("averaging time, s")
+    _save(figure, path)
