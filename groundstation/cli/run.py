@@ -17,6 +17,7 @@ from groundstation.cli.terminal_view import TerminalView
 from groundstation.runtime.live_run import LiveRun
 from groundstation.runtime.lockstep_run import run_lockstep
 from groundstation.runtime.node_table import check_rig
+from groundstation.runtime.plan import check_addresses, processes_of
 from groundstation.runtime.report import write_report
 from groundstation.runtime.rig import load_rig
 
@@ -49,6 +50,8 @@ def run(
     """
     loaded = load_rig(rig)
     check_rig(loaded)
+    check_addresses(loaded)
+    processes_of(loaded)
     if record is not None and record.exists():
         raise UsageError(f"{record} is already there: recordings are never overwritten")
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")

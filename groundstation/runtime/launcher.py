@@ -1,19 +1,14 @@
 """Starts the processes of a rig, knows when each is ready, restarts what died, ends all in good order.
 
-The hub lives here. Children have process groups of their own, so that Ctrl-C reaches the launcher
-alone; the end of their stdin tells them that the launcher is gone, however it went.
+The hub lives here. Children have sessions of their own, so that Ctrl-C reaches the launcher alone; the
+end of their stdin tells them that the launcher is gone, however it went. Nothing here blocks for long:
+whoever supervises can always be asked to end.
 """
 
-import os
 import queue
-import signal
 import socket
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -21,6 +16,7 @@ import zenoh
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus, open_hub
+from groundstation.runtime.child import Child
 from groundstation.runtime.errors import GroundStationError, RigError
 from groundstation.runtime.plan import RECORDER, processes_of
 from groundstation.runtime.process import Orders
@@ -28,70 +24,57 @@ from groundstation.runtime.rig import Rig
 
 LABORATORY = "laboratory"
 COMMANDS = "commands"
-ANNOUNCE_TIMEOUT_S = 30.0
-FIRST_BACK_OFF_S, LAST_BACK_OFF_S, PROVEN_S = 0.25, 8.0, 20.0
+START_S = 30.0
+"""A process that is not ready by then never will be."""
 HUNG_S = 4.0
-STOP_COMMANDS_S, STOP_ALL_S = 0.7, 2.2
+"""Processes give a sign of life ten times a second; the recorder, once."""
+STOP_COMMANDS_S, STOP_NODES_S, STOP_ALL_S = 0.7, 1.5, 2.2
+SEQUENCES_PER_S = 2000
+"""No topic is faster; so numbers of a process that starts again do not repeat those of its last life."""
 
 Say = Callable[[str], None]
 
 
-@dataclass(slots=True)
-class Child:
-    """One process under the launcher's care."""
-
-    name: str
-    popen: subprocess.Popen[bytes] | None = None
-    started_s: float = 0.0
-    is_ready: bool = False
-    restarts: int = 0
-    back_off_s: float = FIRST_BACK_OFF_S
-    restart_at_s: float | None = None
-    last_heard_s: float = 0.0
-
-    @property
-    def state(self) -> str:
-        """``ready``, ``starting`` or ``waiting`` for its next start."""
-        if self.restart_at_s is not None:
-            return "waiting"
-        return "ready" if self.is_ready else "starting"
-
-
 class Launcher:
-    """Runs a rig live; use it as a context manager, then call ``supervise`` until the end.
+    """Runs a rig live; call ``start``, then ``supervise`` until the end, then ``close``.
 
     Args:
         rig: The rig.
-        rig_path: Its file, for the children.
+        rig_path: Its file, for the children; what it says now holds for the whole run.
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
 
     Raises:
-        GroundStationError: The laboratory does not start or announces nothing.
+        RigError: The rig names a laboratory that is not installed.
     """
 
     def __init__(self, rig: Rig, rig_path: Path, recording: Path | None, say: Say) -> None:
-        self._rig = rig
         self._rig_path = rig_path
+        self._rig_text = rig_path.read_text()
         self._recording = recording
         self._say = say
-        self._addresses: dict[str, Address] = {}
+        self._addresses: dict[str, Address] | None = None if rig.laboratory is not None else {}
         self._tidings: queue.SimpleQueue[tuple[str, bool]] = queue.SimpleQueue()
         self._children = {name: Child(name) for name in processes_of(rig)}
         if recording is not None:
             self._children = {RECORDER: Child(RECORDER), **self._children}
-        self.endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._laboratory: Child | None = None
+        if rig.laboratory is not None:
+            self._laboratory = Child(LABORATORY)
+            self._package = _package_of(rig.laboratory.name)
+        self._began_s = 0.0
         self._hub: zenoh.Session | None = None
+        self.endpoint = ""
         self.bus: ZenohBus | None = None
-        self._laboratory: Child | None = Child(LABORATORY) if rig.laboratory is not None else None
 
     def start(self) -> None:
-        """Open the hub, start the laboratory, then every process."""
-        self._hub = open_hub(self.endpoint)
+        """Open the hub and start everything; orders follow once the laboratory has said its ports."""
+        self._began_s = time.monotonic()
+        self.endpoint, self._hub = _open_hub()
         self.bus = ZenohBus(self.endpoint)
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
         if self._laboratory is not None:
-            self._start_laboratory()
+            self._start_laboratory(self._laboratory)
         for child in self._children.values():
             self._start(child)
 
@@ -106,6 +89,11 @@ class Launcher:
         """Whether every process runs."""
         return all(child.is_ready for child in self.children)
 
+    @property
+    def waiting_for(self) -> list[str]:
+        """Names of the processes that are not ready."""
+        return [child.name for child in self.children if not child.is_ready]
+
     def heard(self, process: str) -> None:
         """Note a sign of life (its journal) of a process; called from the bus's thread."""
         child = self._children.get(process)
@@ -113,134 +101,142 @@ class Launcher:
             child.last_heard_s = time.monotonic()
 
     def supervise(self) -> None:
-        """Look after the children once; call a few times a second."""
+        """Look after the children once; call a few times a second.
+
+        Raises:
+            RigError: A child refuses what the rig says.
+            GroundStationError: The laboratory cannot be started.
+        """
         while not self._tidings.empty():
             name, alive = self._tidings.get()
-            child = self._children.get(name)
-            if child is not None:
-                child.is_ready = alive
-        if self._laboratory is not None and _has_ended(self._laboratory):
-            self._say("the laboratory died: starting it again, and every process with it")
-            for child in self._children.values():
-                if child.name != RECORDER:
-                    _kill(child)
-            self._laboratory.restarts += 1
-            self._start_laboratory()
+            known = self._children.get(name)
+            if known is not None:
+                known.is_ready = alive
+        for child in self.children:
+            while not child.complaints.empty():
+                self._say(f"{child.name}: {child.complaints.get()}")
+            if child.has_refused:
+                raise RigError(child.last_words.removeprefix("groundstation: "))
         now_s = time.monotonic()
+        if self._laboratory is not None:
+            self._look_after_laboratory(self._laboratory, now_s)
         for child in self._children.values():
             self._look_after(child, now_s)
 
+    def _look_after_laboratory(self, laboratory: Child, now_s: float) -> None:
+        if laboratory.restart_at_s is not None:
+            if now_s >= laboratory.restart_at_s:
+                laboratory.restarts += 1
+                self._start_laboratory(laboratory)
+                for child in self._children.values():
+                    if child.name != RECORDER:
+                        child.restarts += 1
+                        self._start(child)
+        elif laboratory.has_ended:
+            if self._addresses is None and not laboratory.restarts:
+                raise GroundStationError(f"the laboratory {laboratory.how_it_ended()}")
+            self._addresses = None
+            wait_s = laboratory.back_off(now_s)
+            self._say(
+                f"the laboratory {laboratory.how_it_ended()}: starting it again in {wait_s:.2g} s, "
+                "and every process with it, since its ports are new"
+            )
+            for child in self._children.values():
+                if child.name != RECORDER:
+                    child.kill()
+                    child.restart_at_s = None
+        elif not laboratory.is_ready:
+            self._listen_to(laboratory, now_s)
+
+    def _listen_to(self, laboratory: Child, now_s: float) -> None:
+        while not laboratory.said.empty():
+            try:
+                self._addresses = parse_announcement(laboratory.said.get())
+            except ValueError as error:
+                raise GroundStationError(f"the laboratory announces its ports wrongly: {error}") from error
+            if self._addresses is not None:
+                laboratory.is_ready = True
+                for child in self._children.values():
+                    if child.name != RECORDER:
+                        self._tell(child)
+                return
+        if now_s - laboratory.started_s > START_S:
+            raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
+
     def _look_after(self, child: Child, now_s: float) -> None:
+        if child.name != RECORDER and self._addresses is None:
+            return  # it waits for the laboratory
         if child.restart_at_s is not None:
             if now_s >= child.restart_at_s:
-                child.restart_at_s = None
                 child.restarts += 1
                 self._start(child)
-        elif _has_ended(child):
-            assert child.popen is not None
-            if now_s - child.started_s > PROVEN_S:
-                child.back_off_s = FIRST_BACK_OFF_S
-            how = _how_it_ended(child.popen.returncode)
-            self._say(f"{child.name} {how}; starting it again in {child.back_off_s:.2g} s")
-            child.restart_at_s = now_s + child.back_off_s
-            child.back_off_s = min(2 * child.back_off_s, LAST_BACK_OFF_S)
-            child.is_ready = False
-        elif child.is_ready and child.last_heard_s and now_s - child.last_heard_s > HUNG_S:
-            self._say(f"{child.name} has not been heard of for {HUNG_S:g} s: killing it")
-            child.last_heard_s = 0.0
-            _kill(child)
+        elif child.has_ended:
+            how = child.how_it_ended()
+            self._say(f"{child.name} {how}; starting it again in {child.back_off(now_s):.2g} s")
+        elif child.last_heard_s and now_s - child.last_heard_s > HUNG_S:
+            self._say(f"{child.name} hangs: no sign of life for {HUNG_S:g} s, killing it")
+            child.kill()
+        elif not child.last_heard_s and now_s - child.started_s > START_S:
+            self._say(f"{child.name} is not ready after {START_S:g} s, killing it")
+            child.kill()
 
     def _start(self, child: Child) -> None:
         module = "recorder" if child.name == RECORDER else "process"
+        child.start(["-m", f"groundstation.runtime.{module}"])
+        if self._addresses is not None or child.name == RECORDER:
+            self._tell(child)
+
+    def _tell(self, child: Child) -> None:
+        """Give a started process its orders; it may have loaded what it needs while we did not know them."""
+        elapsed_s = time.monotonic() - self._began_s
         orders = Orders(
             process=child.name,
             rig=str(self._rig_path),
+            rig_text=self._rig_text,
             endpoint=self.endpoint,
-            addresses=dict(self._addresses),
+            addresses=dict(self._addresses or {}),
             recording=None if self._recording is None else str(_numbered(self._recording, child.restarts)),
-            utc_offset_ns=_utc_offset_ns(),
-        )
-        child.popen = subprocess.Popen(
-            [sys.executable, "-m", f"groundstation.runtime.{module}"],
-            stdin=subprocess.PIPE,
-            start_new_session=True,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+            utc_offset_ns=time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns(),
+            sequences_after=round(elapsed_s * SEQUENCES_PER_S) if child.restarts else 0,
         )
         child.started_s = time.monotonic()
-        child.last_heard_s = 0.0  # judged only from its first journal on; the recorder keeps none
-        child.is_ready = False
-        assert child.popen.stdin is not None
-        try:
-            child.popen.stdin.write(orders.line())
-            child.popen.stdin.flush()
-        except BrokenPipeError:
-            self._say(f"{child.name} ended before it had its orders")
+        child.tell(orders.line())
 
-    def _start_laboratory(self) -> None:
-        laboratory, section = self._laboratory, self._rig.laboratory
-        assert laboratory is not None
-        assert section is not None
-        package = _package_of(section.name)
-        laboratory.popen = subprocess.Popen(
-            [sys.executable, "-m", package, str(self._rig_path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        )
-        laboratory.started_s = time.monotonic()
-        laboratory.is_ready = False
-        self._addresses = self._wait_for_announcement(laboratory.popen)
-        laboratory.is_ready = True
-
-    def _wait_for_announcement(self, popen: subprocess.Popen[bytes]) -> dict[str, Address]:
-        found: queue.Queue[dict[str, Address] | None] = queue.Queue()
-        stdout = popen.stdout
-        assert stdout is not None
-
-        def read() -> None:
-            for line in stdout:
-                announced = parse_announcement(line.decode(errors="replace"))
-                if announced is not None:
-                    found.put(announced)
-            found.put(None)
-
-        threading.Thread(target=read, name="laboratory stdout", daemon=True).start()
-        try:
-            announced = found.get(timeout=ANNOUNCE_TIMEOUT_S)
-        except queue.Empty:
-            announced = None
-        if announced is None:
-            raise GroundStationError(
-                f"the laboratory of {self._rig_path} ended or was silent before it announced its ports"
-            )
-        return announced
+    def _start_laboratory(self, laboratory: Child) -> None:
+        self._addresses = None
+        laboratory.start(["-m", self._package, str(self._rig_path)])
 
     def close(self) -> None:
         """Valves first, then every child, then the hub; nothing is left behind after three seconds."""
         begin_s = time.monotonic()
         commands = self._children.get(COMMANDS)
         if commands is not None:
-            _ask_to_end([commands])
-            _wait([commands], begin_s + STOP_COMMANDS_S)
-        others = [child for child in self._children.values() if child.name != RECORDER]
-        _ask_to_end(others)
-        _wait(others, begin_s + STOP_ALL_S - 0.7)
-        last = [child for child in self.children if child not in others]
-        _ask_to_end(last)
-        _wait(last, begin_s + STOP_ALL_S)
+            commands.ask_to_end()
+            commands.wait(begin_s + STOP_COMMANDS_S)
+        nodes = [child for child in self._children.values() if child.name != RECORDER]
+        last = [child for child in self.children if child not in nodes]
+        for group, within_s in ((nodes, STOP_NODES_S), (last, STOP_ALL_S)):
+            for child in group:
+                child.ask_to_end()
+            for child in group:
+                child.wait(begin_s + within_s)
         for child in self.children:
-            _kill(child)
+            child.release()
         if self.bus is not None:
             self.bus.close()
         if self._hub is not None and not self._hub.is_closed():
             self._hub.close()
 
 
-def _free_port() -> int:
+def _open_hub() -> tuple[str, zenoh.Session]:
+    """The hub on a free port of loopback."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    try:
+        return endpoint, open_hub(endpoint)
+    except zenoh.ZError as error:  # somebody took the port in between
+        raise GroundStationError(f"the hub cannot be opened at {endpoint}: {error}") from error
 
 
 def _package_of(name: str) -> str:
@@ -254,41 +250,3 @@ def _package_of(name: str) -> str:
 def _numbered(recording: Path, restarts: int) -> Path:
     """A recorder that starts again writes a file of its own: nothing recorded is overwritten."""
     return recording if restarts == 0 else recording.with_stem(f"{recording.stem}_{restarts}")
-
-
-def _utc_offset_ns() -> int:
-    return time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns()
-
-
-def _has_ended(child: Child) -> bool:
-    return child.popen is not None and child.popen.poll() is not None
-
-
-def _how_it_ended(code: int) -> str:
-    return f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-
-
-def _ask_to_end(children: list[Child]) -> None:
-    for child in children:
-        if child.popen is not None and child.popen.poll() is None:
-            child.popen.terminate()
-
-
-def _wait(children: list[Child], until_s: float) -> None:
-    for child in children:
-        if child.popen is not None:
-            try:
-                child.popen.wait(timeout=max(0.0, until_s - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                continue  # killed at the end
-
-
-def _kill(child: Child) -> None:
-    if child.popen is None:
-        return
-    if child.popen.poll() is None:
-        child.popen.kill()
-        child.popen.wait()
-    for pipe in (child.popen.stdin, child.popen.stdout):
-        if pipe is not None:
-            pipe.close()

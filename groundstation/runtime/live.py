@@ -6,12 +6,15 @@ process say to each other never leaves it before they have heard it, and goes ou
 
 import heapq
 import queue
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
+
+import zenoh
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
@@ -41,7 +44,17 @@ class _FromPort(NamedTuple):
 
 
 class _Newest(NamedTuple):
+    """Something under this key waits in the box of newest items."""
+
     key: str
+
+
+@dataclass(slots=True)
+class _Box:
+    """The newest item of a key, and the envelopes of those that it replaced."""
+
+    item: _Remote | _FromPort
+    replaced: list[bytes] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -90,18 +103,21 @@ class LiveProcess:
         self._sequences = sequences
         self._publish_images = publish_images
         self._dispatch = Dispatch(slots)
-        self._queue: queue.SimpleQueue[_Remote | _FromPort | _Newest | None] = queue.SimpleQueue()
-        self._newest: dict[str, _Remote | _FromPort] = {}
+        self._queue: queue.SimpleQueue[_Remote | _FromPort | _Newest | Exception | None] = queue.SimpleQueue()
+        self._newest: dict[str, _Box] = {}
         self._newest_lock = threading.Lock()
         self._stopping = threading.Event()
-        self._seen_latched: dict[str, int] = {}
+        self._seen_latched: dict[str, tuple[int, int]] = {}
         self._latched: dict[str, tuple[Envelope, bytes]] = {}
         self._local: deque[Delivered] = deque()
         self._held: list[tuple[int, int, Delivered | NodeSlot]] = []
         self._held_count = 0
         self._waiting: dict[str, list[Delivered]] = {}
         self.undecodable = 0
-        self._threads = [PortThread(port, self._from_port, self._port_trouble) for port in ports]
+        self._hub_is_gone = False
+        self._threads = [
+            PortThread(port, self._from_port, self._port_trouble, self._queue.put) for port in ports
+        ]
         self._writers = {
             (topic_of(kind).index, vehicle): thread
             for thread in self._threads
@@ -114,7 +130,13 @@ class LiveProcess:
         self._queue.put(None)
 
     def run(self) -> None:
-        """Run until ``stop``; nodes then have their last words and ports are closed."""
+        """Run until ``stop``; nodes then have their last words and ports are closed, whatever happened."""
+        try:
+            self._run()
+        finally:
+            self._end()
+
+    def _run(self) -> None:
         self._subscribe()
         now_ns = time.monotonic_ns()
         for slot in self._slots:
@@ -148,9 +170,8 @@ class LiveProcess:
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS
             if now_ns >= next_latch_ns:
                 for envelope, encoded in self._latched.values():
-                    self._bus.publish(envelope, encoded)
+                    self._put(envelope, encoded)
                 next_latch_ns = now_ns + LATCH_PERIOD_NS
-        self._end()
 
     # -- in ---------------------------------------------------------------------------------------
 
@@ -183,9 +204,14 @@ class LiveProcess:
             self._queue.put(item)
             return
         with self._newest_lock:
-            waiting = key in self._newest
-            self._newest[key] = item
-        if not waiting:
+            box = self._newest.get(key)
+            if box is None:
+                self._newest[key] = _Box(item)
+            else:
+                if isinstance(box.item, _Remote):
+                    box.replaced.append(box.item.attachment)
+                box.item = item
+        if box is None:
             self._queue.put(_Newest(key))
 
     def _take(self, due_ns: int) -> None:
@@ -195,10 +221,14 @@ class LiveProcess:
             item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
         except queue.Empty:
             return
+        if isinstance(item, Exception):  # a bug in a port's thread: we cannot go on without the port
+            raise item
         found: _Remote | _FromPort | None
         if isinstance(item, _Newest):
             with self._newest_lock:
-                found = self._newest.pop(item.key)
+                box = self._newest.pop(item.key)
+            self._note_replaced(item.key, box.replaced)
+            found = box.item
         else:
             found = item
         if isinstance(found, _Remote):
@@ -206,6 +236,15 @@ class LiveProcess:
         elif isinstance(found, _FromPort):
             self._publish_from_port(found.port.to_message(found.stamp_ns, found.data))
         self._drain()
+
+    def _note_replaced(self, key: str, attachments: list[bytes]) -> None:
+        """Journal what newer messages replaced before this process looked at it."""
+        now_ns = time.monotonic_ns()
+        owner, noun = split_key(key)
+        for attachment in attachments:
+            topic = topic_named(noun)
+            for slot in self._dispatch.topics().get((topic.index, owner), ()):
+                slot.drop(Envelope.unpack(topic, owner, attachment), now_ns)
 
     def _remote(self, item: _Remote) -> None:
         owner, noun = split_key(item.key)
@@ -220,9 +259,10 @@ class LiveProcess:
             return
         if topic.latched:
             key = f"{item.key} {payload.vehicle}"
-            if self._seen_latched.get(key) == envelope.sequence:
+            said = (envelope.sequence, envelope.publish_ns)
+            if self._seen_latched.get(key) == said:
                 return
-            self._seen_latched[key] = envelope.sequence
+            self._seen_latched[key] = said
         self._local.append(Delivered(envelope, payload))
 
     # -- out --------------------------------------------------------------------------------------
@@ -241,13 +281,24 @@ class LiveProcess:
         topic = envelope.topic
         if topic.recorded is Recorded.ALWAYS or self._publish_images:
             encoded = topic.codec.encode(payload)
-            self._bus.publish(envelope, encoded)
+            self._put(envelope, encoded)
             if topic.latched:
                 self._latched[f"{envelope.vehicle}/{topic.noun}"] = (envelope, encoded)
         writer = self._writers.get((topic.index, payload.vehicle))
         if writer is not None:
             writer.write(payload)
         self._local.append(delivered)
+
+    def _put(self, envelope: Envelope, encoded: bytes) -> None:
+        """Hand to the bus; the loop goes on without it, since valves and ports are closed from here."""
+        if self._hub_is_gone:
+            return
+        try:
+            self._bus.publish(envelope, encoded)
+        except zenoh.ZError as error:
+            self._hub_is_gone = True
+            sys.stderr.write(f"the hub is gone, ending: {error}\n")
+            self.stop()
 
     def _publish_from_port(self, payload: Message) -> None:
         topic = topic_of(type(payload))
@@ -279,7 +330,7 @@ class LiveProcess:
     def _wait(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
         waiting = self._waiting.setdefault(slot.key, [])
         if waiting and delivered.envelope.topic.delivery is Delivery.NEWEST:
-            slot.drop(waiting.pop(), now_ns)
+            slot.drop(waiting.pop().envelope, now_ns)
         waiting.append(delivered)
 
     def _hold(self, stamp_ns: int, what: Delivered | NodeSlot) -> None:
@@ -307,7 +358,7 @@ class LiveProcess:
         topic = topic_of(Journal)
         payload = Journal(now_ns, "", self._process, names, entries)
         envelope = Envelope(topic, self._process, self._sequences.next(topic, self._process), now_ns)
-        self._bus.publish(envelope, topic.codec.encode(payload))
+        self._put(envelope, topic.codec.encode(payload))
 
     def _end(self) -> None:
         for slot in self._slots:

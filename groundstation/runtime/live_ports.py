@@ -30,6 +30,7 @@ OK, WARNING, ERROR = 0, 1, 2
 
 FromPort = Callable[[PortTranslation, int, object], None]
 Trouble = Callable[[str, int, str], None]
+Crash = Callable[[Exception], None]
 
 
 class Edge(ABC):
@@ -110,37 +111,58 @@ class PortThread(threading.Thread):
     Args:
         port: The translation, with its address resolved.
         deliver: Called with what arrived, on this thread.
-        trouble: Called with (channel, level, sentence) when the device opens, or cannot, or goes away.
+        trouble: Called with (channel, level, sentence) when the device opens, or cannot, or goes away. A
+            device that was lost counts as open again only when something arrives.
+        crash: Called with what nobody foresaw; the thread then ends.
     """
 
-    def __init__(self, port: PortTranslation, deliver: FromPort, trouble: Trouble) -> None:
+    def __init__(self, port: PortTranslation, deliver: FromPort, trouble: Trouble, crash: Crash) -> None:
         super().__init__(name=f"port {port.channel}", daemon=True)
         self.port = port
         self._deliver = deliver
         self._trouble = trouble
+        self._crash = crash
         self._closing = threading.Event()
         self._edge: Edge | None = None
+        self._is_well = True
+        self._wait_s = FIRST_RETRY_S
 
     def run(self) -> None:
         """Read until closed."""
-        wait_s = FIRST_RETRY_S
         while not self._closing.is_set():
             try:
-                edge = OPENERS[type(self.port)](self.port)
-                self._edge = edge
-                self._trouble(self.port.channel, OK, f"{self.port.channel}: open at {self.port.address}")
-                while not self._closing.is_set():
-                    for stamp_ns, data in edge.read():
-                        self._deliver(self.port, stamp_ns, data)
-                        wait_s = FIRST_RETRY_S
+                self._read_on()
             except DeviceError as error:
+                self._is_well = False
                 if not self._closing.is_set():
-                    sentence = f"{self.port.channel}: {error}; next try in {wait_s:.1f} s"
+                    sentence = f"{self.port.channel}: {error}; next try in {self._wait_s:.1f} s"
                     self._trouble(self.port.channel, ERROR, sentence)
+            except Exception as error:  # the process decides: this is its port
+                self._crash(error)
+                return
             finally:
                 self._release()
-            self._closing.wait(wait_s)
-            wait_s = min(2 * wait_s, LAST_RETRY_S)
+            self._closing.wait(self._wait_s)
+            self._wait_s = min(2 * self._wait_s, LAST_RETRY_S)
+
+    def _read_on(self) -> None:
+        edge = self._edge = OPENERS[type(self.port)](self.port)
+        is_said = self._is_well
+        if is_said:
+            self._say_open()
+        while not self._closing.is_set():
+            for stamp_ns, data in edge.read():
+                self._deliver(self.port, stamp_ns, data)
+                self._wait_s = FIRST_RETRY_S
+                if not is_said:
+                    is_said = self._is_well = True
+                    self._say_open()
+
+    def _say_open(self) -> None:
+        address = self.port.address
+        if isinstance(address, Mapping):
+            address = f"{address.get('interface')} {address.get('channel')}"
+        self._trouble(self.port.channel, OK, f"{self.port.channel}: open at {address}")
 
     def write(self, payload: Message) -> None:
         """Send a message out; where the device is gone it is lost and said so."""

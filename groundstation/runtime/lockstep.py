@@ -175,7 +175,7 @@ class LockstepRunner:
     def _wait(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
         queue = self._waiting.setdefault(slot.key, [])
         if queue and delivered.envelope.topic.delivery is Delivery.NEWEST:
-            slot.drop(queue.pop(), now_ns)
+            slot.drop(queue.pop().envelope, now_ns)
         queue.append(delivered)
 
     def _free(self, slot: NodeSlot, now_ns: int) -> None:

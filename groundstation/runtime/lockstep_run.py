@@ -3,17 +3,21 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from drivers.errors import NotFound
 from drivers.laboratory import load_laboratory
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.topics import topic_of
 from groundstation.messages.definitions import Latency
+from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import RigError
+from groundstation.runtime.errors import RigError, UsageError
 from groundstation.runtime.lockstep import LockstepRunner, Observer
 from groundstation.runtime.monitor import Monitor
 from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.ports import ports_of
+from groundstation.runtime.plan import laboratory_ports
 from groundstation.runtime.provenance import recording_info
 from groundstation.runtime.rig import Rig
 from groundstation.runtime.slot import Sequences
@@ -31,13 +35,22 @@ def make_runner(rig: Rig, seed: int, observers: list[Observer]) -> LockstepRunne
     """
     if rig.laboratory is None:
         raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
+    journal, sequences = JournalWriter(), Sequences()
     try:
         laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
-    except ValueError as error:
-        raise RigError(f"laboratory: {error}") from error
-    journal, sequences = JournalWriter(), Sequences()
-    slots = build_slots(rig, None, journal, sequences, measure=False)
-    return LockstepRunner(slots, laboratory, ports_of(rig), observers, journal, sequences)
+        slots = build_slots(rig, None, journal, sequences, measure=False)
+    except ValidationError as error:
+        raise RigError(_sentence(error)) from error
+    except (NotFound, ValueError) as error:  # a file of the laboratory, or of our calibration
+        raise RigError(str(error)) from error
+    ports = laboratory_ports(rig, laboratory.channels())
+    return LockstepRunner(slots, laboratory, ports, observers, journal, sequences)
+
+
+def _sentence(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in ("laboratory", *first["loc"]))
+    return f"{key}: {first['msg'].removeprefix('Value error, ')}"
 
 
 def seed_of(rig: Rig, seed: int | None) -> int:
@@ -76,13 +89,21 @@ def run_lockstep(
     """Run a rig for ``duration_s`` of virtual time into a recording.
 
     Raises:
-        RigError: The rig cannot run in lockstep.
+        UsageError: The rig cannot run in lockstep, or the recording cannot be written.
     """
     seed = seed_of(rig, seed)
     info = recording_info(rig, rig_path, seed, utc_offset_ns=None)
     monitor = Monitor(tuple(rig.vehicles))
-    with Recorder(recording, info) as recorder:
+    try:
+        recorder = Recorder(recording, info)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    try:
         runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(monitor, recorder)])
+    except BaseException:
+        recorder.discard()
+        raise
+    with recorder:
         try:
             runner.run(
                 round(duration_s * 1e9),

@@ -1,6 +1,6 @@
 """Which process runs what, and where its ports are opened: read from rig and node table."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from groundstation.runtime.errors import RigError
@@ -25,6 +25,41 @@ def processes_of(rig: Rig) -> list[str]:
     return sorted(names, key=lambda name: (name != "commands", name))
 
 
+def check_addresses(rig: Rig) -> None:
+    """Refuse addresses that no port can be opened with.
+
+    Raises:
+        RigError: One sentence with the key.
+    """
+    bus = rig.valve_bus
+    if isinstance(bus, str):
+        if not bus.startswith(LABORATORY):
+            raise RigError(f"valve_bus: expected a table with 'interface' and 'channel', found {bus!r}")
+        if rig.laboratory is None:
+            raise RigError(f"valve_bus: {bus!r} needs a [laboratory] section")
+        return
+    for key in ("interface", "channel"):
+        if key not in bus:
+            raise RigError(f"valve_bus: the key {key!r} is missing")
+
+
+def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[PortTranslation]:
+    """The rig's ports under the names that its laboratory gives their channels, for virtual time.
+
+    Raises:
+        RigError: The laboratory has no such channel, or a device is real.
+    """
+    found = []
+    for port in ports_of(rig):
+        address = port.address
+        if not isinstance(address, str) or not address.startswith(LABORATORY):
+            raise RigError(f"{port.channel}: {address!r} is real hardware, which runs in real time only")
+        channel = address.removeprefix(LABORATORY)
+        _check_channel(channel, channels)
+        found.append(replace(port, channel=channel))
+    return found
+
+
 def resolved_ports(rig: Rig, addresses: Mapping[str, object]) -> list[PortTranslation]:
     """The rig's ports, ``laboratory:`` addresses replaced by what the laboratory announced.
 
@@ -36,9 +71,12 @@ def resolved_ports(rig: Rig, addresses: Mapping[str, object]) -> list[PortTransl
         address = port.address
         if isinstance(address, str) and address.startswith(LABORATORY):
             channel = address.removeprefix(LABORATORY)
-            if channel not in addresses:
-                known = ", ".join(sorted(addresses)) or "none"
-                raise RigError(f"the laboratory has no channel {channel!r} (it has: {known})")
+            _check_channel(channel, addresses)
             address = addresses[channel]
         found.append(replace(port, address=address))
     return found
+
+
+def _check_channel(channel: str, known: Collection[str]) -> None:
+    if channel not in known:
+        raise RigError(f"the laboratory has no channel {channel!r} (it has: {', '.join(sorted(known))})")

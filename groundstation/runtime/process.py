@@ -4,6 +4,7 @@ Its orders are one JSON line on stdin. Stdin then stays open for as long as the 
 means that nobody watches any more, and the process stops in good order, valves first.
 """
 
+import gc
 import json
 import os
 import signal
@@ -14,13 +15,20 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from calibration.camera.errors import CalibrationFileError
+from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.runtime.child import REFUSAL
+from groundstation.runtime.errors import UsageError
 from groundstation.runtime.live import LiveProcess
 from groundstation.runtime.node_table import build_slots
 from groundstation.runtime.plan import resolved_ports
-from groundstation.runtime.rig import load_rig
+from groundstation.runtime.rig import parse_rig
 from groundstation.runtime.slot import Sequences
+
+SWITCH_INTERVAL_S = 0.0005
+"""How long a thread that computes may keep one that reads a port waiting; CPython's 5 ms is late."""
 
 
 @dataclass(frozen=True)
@@ -30,27 +38,49 @@ class Orders:
     Attributes:
         process: Its name in the plan.
         rig: Path of the rig file.
+        rig_text: What the file said when the run began.
         endpoint: Of the hub.
         addresses: Of the laboratory's channels, as announced.
         recording: Path of the recording; used by the recorder.
         utc_offset_ns: UTC minus monotonic clock; used by the recorder.
+        sequences_after: Sequence numbers begin after this one.
     """
 
     process: str
     rig: str
+    rig_text: str
     endpoint: str
     addresses: dict[str, Any]
     recording: str | None = None
     utc_offset_ns: int = 0
+    sequences_after: int = 0
 
     def line(self) -> bytes:
         """As it is written to the child's stdin."""
         return json.dumps(asdict(self)).encode() + b"\n"
 
 
-def read_orders() -> Orders:
-    """Read the orders from stdin."""
-    return Orders(**json.loads(sys.stdin.buffer.readline()))
+def read_orders() -> Orders | None:
+    """Read the orders from stdin; None if the launcher ended before it gave any."""
+    line = sys.stdin.buffer.readline()
+    return Orders(**json.loads(line)) if line else None
+
+
+def obey(run: Callable[[Orders], None]) -> int:
+    """Read the orders and carry them out; return the exit code.
+
+    What the orders name and cannot be used is said in one sentence on stderr.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    orders = read_orders()
+    if orders is None:
+        return 0
+    try:
+        run(orders)
+    except (UsageError, CalibrationFileError, DeviceError) as error:
+        sys.stderr.write(" ".join(str(error).split()) + "\n")
+        return REFUSAL
+    return 0
 
 
 def stop_when_asked(stop: Callable[[], None]) -> None:
@@ -70,10 +100,13 @@ def stop_when_asked(stop: Callable[[], None]) -> None:
 
 def run(orders: Orders) -> None:
     """Build the nodes of the process and run them until told to stop."""
-    rig = load_rig(Path(orders.rig))
-    journal, sequences = JournalWriter(), Sequences()
+    rig = parse_rig(orders.rig_text, Path(orders.rig))
+    journal, sequences = JournalWriter(), Sequences(orders.sequences_after)
     slots = build_slots(rig, orders.process, journal, sequences)
     ports = [port for port in resolved_ports(rig, orders.addresses) if port.process == orders.process]
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    gc.collect()
+    gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds
     with ZenohBus(orders.endpoint) as bus:
         process = LiveProcess(
             orders.process,
@@ -89,4 +122,4 @@ def run(orders: Orders) -> None:
 
 
 if __name__ == "__main__":
-    run(read_orders())
+    sys.exit(obey(run))

@@ -12,15 +12,20 @@ from groundstation.nodes.node import Node
 
 
 class Sequences:
-    """Sequence numbers of everything one process publishes, from 1, per topic and owner."""
+    """Sequence numbers of everything one process publishes, per topic and owner.
 
-    def __init__(self) -> None:
+    Args:
+        after: The first number is the one after this: a process that starts again repeats none.
+    """
+
+    def __init__(self, after: int = 0) -> None:
+        self._after = after
         self._last: dict[tuple[int, str], int] = {}
 
     def next(self, topic: Topic, owner: str) -> int:
         """The next number."""
         key = (topic.index, owner)
-        number = self._last.get(key, 0) + 1
+        number = self._last.get(key, self._after) + 1
         self._last[key] = number
         return number
 
@@ -97,9 +102,8 @@ class NodeSlot:
         self.journal.note(Kind.STOP, self.key, 0, self.process, 0, now_ns)
         return self._wrap(self.node.stop(now_ns), now_ns, None)
 
-    def drop(self, delivered: Delivered, now_ns: int) -> None:
+    def drop(self, envelope: Envelope, now_ns: int) -> None:
         """Journal that a newer message replaced this one before the node was free."""
-        envelope = delivered.envelope
         self.journal.note(
             Kind.DROP, self.key, envelope.topic.index, envelope.vehicle, envelope.sequence, now_ns
         )

@@ -1,0 +1,113 @@
+"""A rig that cannot be flown: one sentence with file and key, exit code 2, no traceback, no output."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from groundstation.cli.main import main
+
+RIGS = Path(__file__).parents[4] / "examples" / "rigs"
+DRAWN = (RIGS / "drawn_fixes.toml").read_text()
+RENDERED = (
+    (RIGS / "two_mock_ups.toml")
+    .read_text()
+    .replace("../../calibration", str(RIGS.parents[1] / "calibration"))
+)
+
+WRONG = {
+    "no TOML": (DRAWN + "\n[oops", "is not valid TOML"),
+    "a typo in a key": (DRAWN.replace("bus_index", "bus_idx"), "vehicles.alpha.bus_i"),
+    "a missing key": (DRAWN.replace('valve_bus = "laboratory:valve_bus"', ""), "'valve_bus' is missing"),
+    "a text for a number": (
+        DRAWN.replace("x_max_m = 2.0", 'x_max_m = "wide"'), "table.x_max_m: ", "found 'wide'",
+    ),
+    "a baud rate that no block has": (
+        DRAWN.replace("baud = 250000", "baud = 9600"), "mock_ups.standard.imu.baud",
+    ),
+    "an unknown mock-up": (
+        DRAWN.replace('mock_up = "standard"', 'mock_up = "big"'),
+        "vehicles.alpha.mock_up: 'big' is not among",
+    ),
+    "an unknown controller": (
+        DRAWN + '\n[mock_ups.standard.control]\ncontroller = "wishful"\n', "controller 'wishful' is none of",
+    ),
+    "an unknown estimator": (
+        DRAWN + '\n[mock_ups.standard.fusion]\nmethod = "guess"\n', "method 'guess' is none of",
+    ),
+    "an unknown node": (DRAWN + "\n[nodes.star_tracer]\nbusy_s = 0.6\n", "nodes.star_tracer: no such node"),
+    "a heavy node beside an urgent one": (
+        RENDERED + '\n[nodes.star_tracker]\nprocess = "{vehicle}_flight"\n',
+        "holds star_tracker, which is heavy, beside",
+    ),
+    "no laboratory for its addresses": (
+        DRAWN[: DRAWN.index("[laboratory]")], "needs a [laboratory] section",
+    ),
+    "a laboratory that is not installed": (DRAWN.replace('name = "emulator"', 'name = "moon"'), "'moon'"),
+    "a typo in the laboratory's table": (
+        DRAWN.replace("tilt_rad", "tild_rad"), "laboratory.table.tild_rad",
+    ),
+    "a laboratory without the channel": (
+        DRAWN.replace("laboratory:alpha/imu", "laboratory:gamma/imu"), "no channel 'gamma/imu'",
+    ),
+    "a vehicle called like a process": (
+        DRAWN.replace("alpha", "commands"), "names both a vehicle and a process",
+    ),
+    "a calibration file that is not there": (
+        RENDERED.replace("calibration/rigs/emulated/ceiling.csv\"\ndelay_s", "nowhere.csv\"\ndelay_s"),
+        "nowhere.csv",
+    ),
+}  # fmt: skip
+
+
+def refused(capsys, monkeypatch, *words):
+    """The one sentence that a refused call of the command leaves on stderr."""
+    monkeypatch.setattr(sys, "argv", ["groundstation", *map(str, words)])
+    with pytest.raises(SystemExit) as ending:
+        main()
+    assert ending.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("groundstation: ")
+    assert said.err.count("\n") == 1, said.err
+    return said.err
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys, monkeypatch):
+    text, *expected = WRONG[what]
+    rig = tmp_path / "rig.toml"
+    rig.write_text(text)
+    out = tmp_path / "run.mcap"
+    words = ("run", rig, "--lockstep", "--duration", "1", "--record", out, "--report", tmp_path / "report")
+    sentence = refused(capsys, monkeypatch, *words)
+    for part in expected:
+        assert part in sentence
+    assert list(tmp_path.iterdir()) == [rig]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["nowhere.toml"], "nowhere.toml: there is no such rig file"),
+        ([RIGS / "drawn_fixes.toml", "--lockstep"], "--lockstep needs --duration"),
+        ([RIGS / "drawn_fixes.toml", "--seed", "3"], "--seed goes with --lockstep"),
+        ([RIGS / "drawn_fixes.toml", "--record", RIGS / "drawn_fixes.toml"], "never overwritten"),
+        ([RIGS], "cannot be read as a rig file"),
+    ],
+)  # fmt: skip
+def test_a_call_that_makes_no_sense_is_refused(words, expected, capsys, monkeypatch):
+    assert expected in refused(capsys, monkeypatch, "run", *words)
+
+
+@pytest.mark.parametrize("what", ["a typo in the laboratory's table", "a calibration file that is not there"])
+def test_what_a_child_process_refuses_ends_a_live_run_with_its_sentence(what, tmp_path):
+    text, expected = WRONG[what]
+    rig = tmp_path / "rig.toml"
+    rig.write_text(text.replace("../../calibration", str(RIGS.parents[1] / "calibration")))
+    words = [sys.executable, "-m", "groundstation", "run", rig, "--headless", "--record", tmp_path / "a.mcap"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert expected in done.stderr
