@@ -4,100 +4,16 @@ Prints one JSON line that says where each channel can be opened, then serves unt
 stdin is a pipe, its end.
 """
 
-import argparse
 import os
 import signal
 import sys
-import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-
-from pydantic import ValidationError
-
-from firmware_emulator.live.server import LiveLaboratory
-from firmware_emulator.sky.scene import SceneError
-
-_ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-
-
-class _Ended(BaseException):
-    """A signal came before there was a laboratory to stop."""
-
-
-class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters
-    """The rig file cannot be used; the message says why in one sentence."""
-
-
-def read_laboratory(path: Path) -> dict[str, object]:
-    """The `[laboratory]` table of a rig file, with `folder` set to where the file lies."""
-    try:
-        rig = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise _BadRig(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise _BadRig(f"{path}: is no TOML file ({error})") from error
-    table = rig.get("laboratory")
-    if not isinstance(table, Mapping):
-        raise _BadRig(f"{path}: has no table [laboratory]")
-    return {"folder": str(path.resolve().parent), **table}
-
-
-def sentence(error: ValidationError) -> str:
-    """The first complaint of a validation as one sentence that names the key."""
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    return f"laboratory.{key}: {first['msg']}" + (f", got {first['input']!r}" if not first.get("ctx") else "")
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve the laboratory of a rig file; return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m firmware_emulator", description=__doc__)
-    parser.add_argument("rig", type=Path, help="rig file (TOML) with a table [laboratory]")
-    parser.add_argument("--seed", type=int, default=0, help="decides every random number (default 0)")
-    options = parser.parse_args(arguments)
-    with _signals(_end):
-        try:
-            laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
-        except ValidationError as error:
-            return _refuse(f"{options.rig}: {sentence(error)}")
-        except (_BadRig, SceneError) as error:
-            return _refuse(str(error))
-        except _Ended:
-            return 0
-        try:
-            with _signals(lambda *_: laboratory.stop()):
-                laboratory.watch_parent()
-                sys.stdout.write(laboratory.announcement())
-                sys.stdout.flush()
-                laboratory.run()
-        except (_Ended, BrokenPipeError):  # nobody listens to the announcement any more
-            return 0
-        finally:
-            laboratory.close()
-    return 0
-
-
-@contextmanager
-def _signals(handler: Callable[..., None]) -> Iterator[None]:
-    """Let a handler have the signals that end us, for a while."""
-    before = {number: signal.signal(number, handler) for number in _ENDING}
-    try:
-        yield
-    finally:
-        for number, previous in before.items():
-            signal.signal(number, previous)
-
-
-def _end(*_: object) -> None:
-    raise _Ended
-
-
-def _refuse(complaint: str) -> int:
-    sys.stderr.write(" ".join(complaint.split()) + "\n")
-    return 2
-
 
 if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Before the imports, which take half a second: whoever ends us meanwhile wants no traceback.
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda *_: os._exit(0))
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported
+
+    from firmware_emulator.live.command import main
+
     sys.exit(main())

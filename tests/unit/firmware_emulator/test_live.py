@@ -20,9 +20,9 @@ from drivers.reference.protocol import PoseParser
 from drivers.star_camera.port import StarCamera
 from drivers.valve_bus.port import ValveBusPort
 from drivers.valve_bus.protocol import Arm, CanFrame, ValveStatus, decode, encode
-from firmware_emulator.__main__ import main
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.live.cameras import CameraProcess
+from firmware_emulator.live.command import main
 from firmware_emulator.live.pty_port import PtyPort
 from firmware_emulator.live.server import LiveLaboratory
 from firmware_emulator.live.slcan import SlcanSession, encode_frame
