@@ -2,7 +2,9 @@
 
 import hashlib
 import math
+from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,34 +13,50 @@ from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
-from groundstation.messages.definitions import CalibrationInUse, StarFix, StarSpots
+from groundstation.messages.definitions import CalibrationInUse, StarFix, StarSpots, VehicleState
 from groundstation.nodes.node import Node
 from groundstation.star_tracking import fixes, tracker
 from groundstation.star_tracking.detection import Spots
+from groundstation.star_tracking.prior_governor import PriorGovernor
 
+MEMORY_NS = 2_000_000_000
+REACH_NS = 50_000_000
+"""Between two states of 100 Hz there are 10 ms; farther than this the IMU has fallen silent."""
 _NO_COVARIANCE = (math.nan,) * 9
 
 
 class StarTracker(Node):
-    """Finds the ceiling in every set of spots, lost in space.
+    """Finds the ceiling in every set of spots; from a prior where the state is known, else lost in space.
 
     Args:
         vehicle: Its name.
         camera: Calibration file of the camera.
         ceiling: Star catalogue.
         stamp_sigma_s: Standard deviation of the exposure's stamp.
+        settings: Of the search, exposure and shutter included.
 
     Raises:
         CalibrationFileError: A file is missing or wrong.
     """
 
-    inputs = (StarSpots,)
+    inputs = (StarSpots, VehicleState)
     outputs = (StarFix, CalibrationInUse)
 
-    def __init__(self, vehicle: str, camera: Path, ceiling: Path, stamp_sigma_s: float) -> None:
+    def __init__(
+        self,
+        vehicle: str,
+        camera: Path,
+        ceiling: Path,
+        stamp_sigma_s: float,
+        settings: tracker.TrackerSettings,
+    ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
-        self._tracker = tracker.StarTracker(StarCatalogue.load(ceiling), CameraCalibration.load(camera))
+        self._tracker = tracker.StarTracker(
+            StarCatalogue.load(ceiling), CameraCalibration.load(camera), settings
+        )
+        self._governor = PriorGovernor()
+        self._states: deque[VehicleState] = deque()
         self._stamp_sigma_s = stamp_sigma_s
 
     def start(self, now_ns: int) -> Iterator[Message]:
@@ -49,16 +67,24 @@ class StarTracker(Node):
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns
-        assert isinstance(message, StarSpots)
-        if message.reason:
-            yield self._refusal(message, message.reason)
-            return
-        answer = self._tracker.solve(_spots(message))
+        match message:
+            case VehicleState():
+                self._remember(message)
+            case StarSpots(reason="") as spots:
+                yield self._solve(spots)
+            case StarSpots() as spots:
+                yield self._refusal(spots, spots.reason)
+
+    def _solve(self, spots: StarSpots) -> StarFix:
+        state = self._state_at(spots.stamp_ns)
+        prior = None if state is None else _prior(state, self._stamp_sigma_s)
+        motion = None if state is None else fixes.BodyMotion(*state.velocity_table_m_s, state.rate_rad_s)
+        answer = self._tracker.solve(_spots(spots), self._governor.admit(prior), motion)
+        self._governor.note(answer, prior)
         if isinstance(answer, fixes.NoFix):
-            yield self._refusal(message, f"{answer.reason.value}: {answer.detail}")
-            return
-        yield StarFix(
-            message.stamp_ns,
+            return self._refusal(spots, f"{answer.reason.value}: {answer.detail}")
+        return StarFix(
+            spots.stamp_ns,
             self.vehicle,
             True,
             answer.x_m,
@@ -69,6 +95,30 @@ class StarTracker(Node):
             answer.stars,
             answer.mode.value,
             "",
+        )
+
+    def _remember(self, state: VehicleState) -> None:
+        """Keep two seconds of states, none of them of a lost filter."""
+        states = self._states
+        if state.status != "flying":
+            states.clear()
+            return
+        states.append(state)
+        while state.stamp_ns - states[0].stamp_ns > MEMORY_NS:
+            states.popleft()
+
+    def _state_at(self, stamp_ns: int) -> VehicleState | None:
+        """The state at an exposure: the newest before it carried on, if that is not too far."""
+        before = next((state for state in reversed(self._states) if state.stamp_ns <= stamp_ns), None)
+        if before is None or stamp_ns - before.stamp_ns > REACH_NS:
+            return None
+        span_s = (stamp_ns - before.stamp_ns) * 1e-9
+        (x, y), (vx, vy) = before.position_table_m, before.velocity_table_m_s
+        return replace(
+            before,
+            stamp_ns=stamp_ns,
+            position_table_m=(x + vx * span_s, y + vy * span_s),
+            heading_rad=before.heading_rad + before.rate_rad_s * span_s,
         )
 
     def _refusal(self, spots: StarSpots, reason: str) -> StarFix:
@@ -84,6 +134,13 @@ class StarTracker(Node):
             fixes.Mode.LOST_IN_SPACE.value,
             reason,
         )
+
+
+def _prior(state: VehicleState, stamp_sigma_s: float) -> fixes.PosePrior:
+    """What the filter believes of the pose at the exposure, whose stamp is uncertain too."""
+    motion = np.array([*state.velocity_table_m_s, state.rate_rad_s])
+    covariance = np.diag(np.square(state.pose_std)) + stamp_sigma_s**2 * np.outer(motion, motion)
+    return fixes.PosePrior(*state.position_table_m, state.heading_rad, covariance)
 
 
 def _spots(message: StarSpots) -> Spots:

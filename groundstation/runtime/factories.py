@@ -94,10 +94,12 @@ def spot_finder(rig: Rig, vehicle: str) -> Node:
 def star_tracker(rig: Rig, vehicle: str) -> Node:
     """Identification and pose."""
     from groundstation.nodes.star_tracker import StarTracker  # OpenCV loads only where it is used
+    from groundstation.star_tracking.tracker import TrackerSettings
 
     camera = rig.mock_up_of(vehicle).star_camera
     assert camera is not None
-    return StarTracker(vehicle, camera.camera, camera.ceiling, camera.delay_sigma_s)
+    settings = TrackerSettings(exposure_s=camera.exposure_s, readout_s=camera.readout_s)
+    return StarTracker(vehicle, camera.camera, camera.ceiling, camera.delay_sigma_s, settings)
 
 
 def fusion(rig: Rig, vehicle: str) -> Node:

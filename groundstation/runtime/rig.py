@@ -73,6 +73,8 @@ class StarCameraSection(_Section):
     delay_s: NonNegative = 0.0
     delay_sigma_s: NonNegative = 0.002
     timeout_s: Positive = 2.0
+    exposure_s: NonNegative = 0.0
+    readout_s: NonNegative = 0.0
     sigma_xy_m: Positive = 0.001
     sigma_heading_rad: Positive = 0.0009
 
