@@ -119,8 +119,8 @@ class CameraConfig(Settings):
     exposure_s: Positive = 0.02
     readout_s: NonNegative = 0.0
     """Rolling shutter: time between the exposures of first and last row."""
-    delay_s: NonNegative = 0.6
-    """From the middle of the exposure to the host."""
+    delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.6
+    """From the middle of the exposure to the host; a drawn fix can say ages up to 4.29 s."""
     delay_jitter_s: NonNegative = 0.002
     sigma_xy_m: NonNegative = 0.001
     sigma_heading_rad: NonNegative = 0.00087
@@ -135,6 +135,15 @@ class CameraConfig(Settings):
     """Path of the star list (id,x_m,y_m); needed by `rendered`."""
     camera: str = ""
     """Path of the camera file (JSON); needed by `rendered`."""
+
+    @model_validator(mode="after")
+    def _exposure_fits_the_rate(self) -> "CameraConfig":
+        if self.source == "rendered" and (self.exposure_s + self.readout_s) * self.rate_hz >= 1.0:
+            raise ValueError(
+                f"exposure_s + readout_s = {self.exposure_s + self.readout_s:g} s is longer than a period of "
+                f"rate_hz = {self.rate_hz:g}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _rendering_has_its_files(self) -> "CameraConfig":
@@ -171,7 +180,7 @@ class VehicleConfig(Settings):
     camera: CameraConfig = CameraConfig()
     reference_rate_hz: NonNegative = 50.0
     """Poses per second of the truth stream; 0 for none."""
-    reference_delay_s: NonNegative = 0.002
+    reference_delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.002
     seed_offset: Annotated[int, Field(ge=0)] = 0
     """Added to the seed of this vehicle's random numbers."""
 

@@ -84,12 +84,15 @@ class LiveLaboratory:
         laboratory, selector = self._laboratory, self._selector
         gc.collect()
         gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds
-        while not self._is_stopping:
-            self.step()
-            next_ns = laboratory.next_arrival_ns() or 0
-            wait_s = min(_LONGEST_WAIT_S, max(0, next_ns - time.monotonic_ns()) / NS_PER_S)
-            for key, _ in selector.select(wait_s):
-                key.data()
+        try:
+            while not self._is_stopping:
+                self.step()
+                next_ns = laboratory.next_arrival_ns() or 0
+                wait_s = min(_LONGEST_WAIT_S, max(0, next_ns - time.monotonic_ns()) / NS_PER_S)
+                for key, _ in selector.select(wait_s):
+                    key.data()
+        finally:
+            gc.unfreeze()
 
     def step(self) -> None:
         """Bring the laboratory to now and hand out what has arrived."""

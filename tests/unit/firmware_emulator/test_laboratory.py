@@ -4,6 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame, encode_identify
+from drivers.imu_block.sensors import rate_rad_s, specific_force_m_s2
 from drivers.laboratory import ChannelKind, Laboratory
 from drivers.reference.protocol import PoseParser
 from drivers.valve_bus.protocol import (
@@ -146,6 +147,39 @@ def test_a_pulse_on_the_bus_becomes_speed_on_the_table():
     assert final.velocity_table_m_s[1] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("model", ["published", "datasheet"])
+def test_what_the_imu_says_integrates_to_what_the_truth_stream_says(model):
+    imu = {
+        "model": model, "averaging": 5, "clock_ppm": 0.0, "gyro_bias_rad_s": 0.0, "switch_on_sd_rad_s": 0.0,
+        "gyro_tempco_rad_s_k": 0.0, "gyro_scale_error": 0.0, "acc_bias_m_s2": [0.0, 0.0],
+        "acc_tempco_m_s2_k": [0.0, 0.0], "acc_scale_error": [0.0, 0.0], "position_body_m": [0.0, 0.0],
+        "ambient_c": 25.0, "warm_up_k": 0.0, "ftdi_latency_ms": 1,
+    }  # fmt: skip
+    config = {**scenario(floating=True, imu=imu), "table": {"waviness_rad": 0.0}}
+    laboratory = EmulatedLaboratory(config, seed=9)
+    laboratory.deliver(0, "valve_bus", encode(Arm(0, True)))
+    arrivals = []
+    for tick in range(1, 150):
+        arrivals += laboratory.advance(tick * 20 * MS)
+        on_times = (0, 120, 0, 0, 0, 0, 0, 0) if 20 < tick < 40 else (0,) * 8  # pushes and turns
+        command = ValveCommand(0, tick & 15, tick & 15, on_times)
+        laboratory.deliver(tick * 20 * MS, "valve_bus", encode(command))
+    heading_rad, vx_m_s, vy_m_s = 0.0, 0.0, 0.0
+    for frame in frames(arrivals):
+        window_s = 1e-3 * frame.sample_count
+        turned_rad = rate_rad_s(frame.gyro_counts) * window_s
+        fx, fy = (specific_force_m_s2(counts) for counts in frame.tilt_difference_counts)
+        middle_rad = heading_rad + turned_rad / 2.0
+        vx_m_s += (fx * math.cos(middle_rad) - fy * math.sin(middle_rad)) * window_s
+        vy_m_s += (fx * math.sin(middle_rad) + fy * math.cos(middle_rad)) * window_s
+        heading_rad += turned_rad
+    truth = poses(arrivals)[-1]
+    assert truth.heading_rad > math.radians(5.0)
+    # The gyro walks 0.17 deg in 3 s (0.1 deg/s/sqrt(Hz)); tilt codes stick by up to 1.5 mm/s^2 when quiet.
+    assert heading_rad == pytest.approx(truth.heading_rad, abs=math.radians(0.5))
+    assert (vx_m_s, vy_m_s) == pytest.approx(truth.velocity_table_m_s, abs=0.004)
+
+
 def test_silence_on_the_bus_closes_the_valves_after_100_ms():
     laboratory = EmulatedLaboratory(scenario(floating=True), seed=1)
     laboratory.deliver(0, "valve_bus", encode(Arm(0, True)))
@@ -217,6 +251,17 @@ def test_drawn_fixes_are_late_and_as_noisy_as_they_say():
         ({"vehicles": [{"name": "alpha", "mass_kg": -1.0}]}, "vehicles.0.mass_kg"),
         ({"vehicles": [{"name": "alpha"}], "faults": [{"kind": "gremlin", "vehicle": "alpha"}]}, "faults.0"),
         ({"vehicles": [{"name": "alpha", "camera": {"source": "rendered"}}]}, "vehicles.0.camera"),
+        (
+            {
+                "vehicles": [
+                    {
+                        "name": "alpha",
+                        "camera": {"source": "rendered", "ceiling": "c", "camera": "c", "rate_hz": 60.0},
+                    }
+                ]
+            },
+            "vehicles.0.camera",
+        ),
     ],
 )
 def test_a_wrong_scenario_names_its_key(change, key):
