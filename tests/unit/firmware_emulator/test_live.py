@@ -30,7 +30,7 @@ from firmware_emulator.live.tcp_server import MAX_WAITING_BYTES, TcpServer
 
 FAST = {
     "name": "alpha",
-    "imu": {"averaging": 4, "ftdi_latency_ms": 1},
+    "imu": {"averaging": 10, "ftdi_latency_ms": 1},
     "camera": {"rate_hz": 20.0, "delay_s": 0.05},
 }
 
@@ -60,11 +60,11 @@ def frames_of(port, parser, count):
 def test_an_imu_driver_reads_a_live_block_and_is_answered():
     with serving({"vehicles": [FAST]}) as addresses, SerialPort(str(addresses["alpha/imu"])) as port:
         parser = FrameParser(2)
-        frames = [item for item in frames_of(port, parser, 30) if isinstance(item, ImuFrame)]
+        frames = [item for item in frames_of(port, parser, 20) if isinstance(item, ImuFrame)]
         steps = {(b.tick_ms - a.tick_ms) & 0xFFFF for a, b in pairwise(frames)}
-        assert steps == {4}
+        assert steps == {10}
         port.write(encode_identify(7))
-        answered = frames_of(port, parser, 30)
+        answered = frames_of(port, parser, 20)
         assert [item.serial_number for item in answered if isinstance(item, Identity)] == [1]
 
 
