@@ -1,0 +1,75 @@
+"""Flying in virtual time: a whole rig in one thread, everything it said kept in memory."""
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.runtime.lockstep_run import make_runner
+from groundstation.runtime.rig import parse_rig
+
+RIGS = Path(__file__).parents[2] / "examples" / "rigs"
+SHORT_REST = "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n"
+
+
+class Flight:
+    """A lockstep run; ``said`` holds payloads by class, in the order of their publication."""
+
+    def __init__(self, text, seed):
+        self.said = defaultdict(list)
+        self.stamps_ns = defaultdict(list)
+        self.rig = parse_rig(text, RIGS / "test.toml")
+        self.runner = make_runner(self.rig, seed, [self._keep])
+
+    def _keep(self, delivered, now_ns):
+        self.said[type(delivered.payload)].append(delivered.payload)
+        self.stamps_ns[type(delivered.payload)].append(now_ns)
+
+    def run(self, seconds):
+        self.runner.run(round(seconds * 1e9))
+        return self
+
+    def of(self, kind, vehicle="alpha", start_s=0.0, stop_s=1e9):
+        """Payloads of one class and vehicle that were published in a span of time."""
+        return [
+            payload
+            for payload, now_ns in zip(self.said[kind], self.stamps_ns[kind], strict=True)
+            if payload.vehicle == vehicle and start_s * 1e9 <= now_ns < stop_s * 1e9
+        ]
+
+    def counters(self, node):
+        """The newest counters of a node, by name."""
+        from groundstation.messages.definitions import Diagnostics
+
+        said = [row for row in self.said[Diagnostics] if row.node == node]
+        return dict(zip(said[-1].keys, map(int, said[-1].values), strict=True)) if said else {}
+
+    def off_goal(self, vehicle="alpha", start_s=0.0):
+        """Truth against the held pose: distances (m) and turns (rad), one per reference sample."""
+        from groundstation.frames import wrap_angle
+        from groundstation.messages.definitions import ReferenceState
+
+        hold = self.rig.vehicles[vehicle].hold
+        rows = self.of(ReferenceState, vehicle, start_s)
+        distances = [
+            np.hypot(r.position_table_m[0] - hold.x_m, r.position_table_m[1] - hold.y_m) for r in rows
+        ]
+        turns = [wrap_angle(r.heading_rad - np.radians(hold.heading_deg)) for r in rows]
+        return np.array(distances), np.array(turns)
+
+
+@pytest.fixture
+def fly():
+    """Makes flights of an example rig with lines added; they are closed at the end of the test."""
+    flights = []
+
+    def make(more="", *, rig="drawn_fixes", seed=1, short_rest=True):
+        text = (RIGS / f"{rig}.toml").read_text()
+        flight = Flight(text + (SHORT_REST if short_rest else "") + more, seed)
+        flights.append(flight)
+        return flight
+
+    yield make
+    for flight in flights:
+        flight.runner.close()

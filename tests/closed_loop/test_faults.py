@@ -1,0 +1,104 @@
+"""What goes wrong in the laboratory is counted under its name, and the vehicle survives it."""
+
+import numpy as np
+import pytest
+
+from groundstation.messages import definitions as m
+
+FAULT_S, END_S, STOP_S = 4.0, 6.0, 8.0
+
+
+def fault(kind, **parameters):
+    """A row of the scenario: the fault lasts from FAULT_S to END_S."""
+    inner = ", ".join(f"{name} = {float(value)}" for name, value in parameters.items())
+    return (
+        f'\n[[laboratory.faults]]\nkind = "{kind}"\nvehicle = "alpha"\n'
+        f"start_s = {FAULT_S}\nend_s = {END_S}\nparameters = {{ {inner} }}\n"
+    )
+
+
+def assert_survived(flight):
+    """It flies on, on the table, near its goal, with a state that agrees with truth."""
+    assert flight.of(m.SequencePhase)[-1].phase == "flying"
+    truth = flight.of(m.ReferenceState, start_s=STOP_S - 0.5)
+    states = flight.of(m.VehicleState, start_s=STOP_S - 0.5)
+    assert states
+    assert states[-1].status == "flying"
+    error = np.subtract(states[-1].position_table_m, truth[-1].position_table_m)
+    assert np.hypot(*error) < 0.02
+    distances, _ = flight.off_goal(start_s=STOP_S - 0.5)
+    assert distances.max() < 0.4
+    assert flight.of(m.ValveCommand, start_s=STOP_S - 0.1)[-1].gate == "open"
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "counter"),
+    [
+        ("bit_flips", {"probability_per_bit": 1e-3}, "rejected_crc"),
+        ("lost_bytes", {"probability_per_byte": 1e-2}, "frames_lost"),
+        ("half_frames", {"probability_per_frame": 0.2}, "frames_lost"),
+    ],
+)
+def test_noise_on_the_line_is_counted_by_its_name(fly, kind, parameters, counter):
+    flight = fly(fault(kind, **parameters)).run(STOP_S)
+    assert_survived(flight)
+    assert flight.counters("alpha/imu_reader")[counter] > 0
+
+
+def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
+    flight = fly(fault("stuck_gyro", code=0)).run(STOP_S)
+    samples = flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S)
+    assert {imu.reason for imu in samples} == {"gyro_range"}
+    assert not any(imu.valid for imu in samples)
+    assert_survived(flight)
+
+
+def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
+    flight = fly(fault("stuck_gyro")).run(STOP_S + 6.0)
+    assert flight.of(m.VehicleState)[-1].status == "flying"
+    distances, _ = flight.off_goal(start_s=STOP_S + 5.5)
+    assert distances.max() < 0.4
+
+
+def test_a_tilt_chip_that_dies_is_named_and_not_believed(fly):
+    flight = fly(fault("dead_tilt", axis=1)).run(STOP_S)
+    reasons = {imu.reason for imu in flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)}
+    assert all("tilt_y" in reason for reason in reasons)
+    assert_survived(flight)
+
+
+def test_without_stars_the_age_of_the_fix_grows_and_the_vehicle_holds_on(fly):
+    flight = fly(fault("dead_sky")).run(STOP_S)
+    before_end = flight.of(m.FusionStatus, start_s=END_S - 0.3, stop_s=END_S)
+    assert before_end[-1].fix_age_s > END_S - FAULT_S - 0.3
+    assert_survived(flight)
+
+
+def test_a_frozen_camera_cannot_pull_the_vehicle_along(fly):
+    flight = fly(fault("frozen_camera")).run(STOP_S)
+    assert_survived(flight)
+
+
+def test_wrong_fixes_are_refused_and_counted(fly):
+    flight = fly(fault("false_lights")).run(STOP_S)
+    refused = [row for row in flight.of(m.FixAccount, start_s=FAULT_S) if not row.used]
+    assert refused
+    assert all(row.reason for row in refused)
+    assert flight.of(m.FusionStatus)[-1].fixes_refused >= len(refused)
+    assert_survived(flight)
+
+
+@pytest.mark.parametrize("kind", ["stuck_open_valve", "stuck_closed_valve"])
+def test_the_other_valves_make_up_for_one_that_fails(fly, kind):
+    flight = fly(fault(kind, valve=0)).run(STOP_S)
+    assert_survived(flight)
+
+
+def test_a_silent_bus_closes_the_valves_and_flight_goes_on_when_it_speaks_again(fly):
+    flight = fly(fault("silent_bus")).run(STOP_S)
+    assert not flight.of(m.ValveStatus, start_s=FAULT_S + 0.1, stop_s=END_S)
+    first = flight.of(m.ValveStatus, start_s=END_S)[0]
+    assert first.dead_man
+    assert first.open_mask == 0
+    assert flight.of(m.ValveStatus)[-1].armed
+    assert_survived(flight)

@@ -1,0 +1,101 @@
+"""From landed to flying, and what closes the valves when somebody falls silent."""
+
+import pytest
+
+from groundstation.messages import definitions as m
+from groundstation.nodes.node import Node
+from groundstation.runtime.errors import RigError
+from groundstation.runtime.lockstep_run import make_runner
+from groundstation.runtime.slot import NodeSlot
+
+SILENT_S = 5.0
+
+
+def mute(flight, name):
+    """From SILENT_S on nothing that a node says gets out, as if it had died."""
+    slots = {slot.key: slot for slot in flight.runner._slots}
+    slot = slots[f"alpha/{name}"]
+    node = slot.node
+
+    class Mute(Node):
+        inputs, outputs = node.inputs, node.outputs
+
+        def start(self, now_ns):
+            return node.start(now_ns)
+
+        def vehicles_heard(self, payload):
+            return node.vehicles_heard(payload)
+
+        def receive(self, message, now_ns):
+            said = tuple(node.receive(message, now_ns))
+            return said if now_ns < SILENT_S * 1e9 else ()
+
+        def tick(self, now_ns):
+            said = tuple(node.tick(now_ns))
+            return said if now_ns < SILENT_S * 1e9 else ()
+
+    assert isinstance(slot, NodeSlot)
+    slot.node = Mute(node.vehicle, node.tick_period_ns)
+
+
+def test_the_start_goes_landed_rest_float_armed_flying(fly):
+    flight = fly().run(4.0)
+    phases = [row.phase for row in flight.of(m.SequencePhase) if row.phase != "waiting"]
+    assert phases == ["rest calibration", "float air", "arming", "flying"]
+    asked = [row.action for row in flight.of(m.Request)]
+    assert asked == ["float_on", "arm"]
+    assert [(row.action, row.accepted) for row in flight.of(m.Ack)] == [("float_on", True), ("arm", True)]
+    before = flight.of(m.ValveStatus, stop_s=1.0)
+    assert not any(status.floating or status.armed or status.open_mask for status in before)
+
+
+def test_no_valve_opens_before_the_vehicle_is_armed(fly):
+    flight = fly().run(4.0)
+    armed_s = next(
+        now_ns * 1e-9
+        for mode, now_ns in zip(flight.said[m.VehicleMode], flight.stamps_ns[m.VehicleMode], strict=True)
+        if mode.armed
+    )
+    assert not any(status.open_mask for status in flight.of(m.ValveStatus, stop_s=armed_s))
+
+
+def test_a_silent_controller_makes_the_mux_brake(fly):
+    flight = fly()
+    mute(flight, "controller")
+    flight.run(SILENT_S + 4.0)
+    sources = {row.source for row in flight.of(m.ValveSelection, start_s=SILENT_S + 0.5)}
+    assert sources == {"brake"}
+    speeds = [row.velocity_table_m_s for row in flight.of(m.ReferenceState, start_s=SILENT_S + 3.5)]
+    assert max(max(map(abs, speed)) for speed in speeds) < 0.005
+
+
+def test_a_silent_mux_makes_the_guard_close(fly):
+    flight = fly()
+    mute(flight, "command_mux")
+    flight.run(SILENT_S + 1.0)
+    late = flight.of(m.ValveCommand, start_s=SILENT_S + 0.15)
+    assert late
+    assert not any(command.open_mask for command in late)
+    assert {command.gate for command in late} == {"stale"}
+    assert not any(status.open_mask for status in flight.of(m.ValveStatus, start_s=SILENT_S + 0.2))
+
+
+def test_a_silent_guard_makes_the_valve_node_close(fly):
+    flight = fly()
+    mute(flight, "guard")
+    flight.run(SILENT_S + 1.0)
+    late = flight.of(m.ValveStatus, start_s=SILENT_S + 0.2)
+    assert all(status.dead_man and not status.open_mask for status in late)
+
+
+def test_a_rig_without_a_laboratory_has_no_virtual_time(fly):
+    rig = fly().rig
+    with pytest.raises(RigError, match=r"needs a \[laboratory\]"):
+        make_runner(rig.model_copy(update={"laboratory": None}), 1, [])
+
+
+def test_a_real_device_is_refused_in_virtual_time(fly):
+    rig = fly().rig
+    vehicle = rig.vehicles["alpha"].model_copy(update={"imu": "/dev/ttyUSB0"})
+    with pytest.raises(RigError, match="'/dev/ttyUSB0' is real hardware"):
+        make_runner(rig.model_copy(update={"vehicles": {"alpha": vehicle}}), 1, [])
