@@ -11,6 +11,6 @@ It shares codecs with the drivers, and no mathematics with the ground station.
 scenario is the rig's `[laboratory]` table (`config`, `mock_up_config`, `faults`).
 
 Not modelled: the IMU block's firmware instruction by instruction, and with it the moments of the single SPI
-transfers within a poll (0.4 ms); vertical shocks, which would show in X + Y of the inclinometers; a vehicle that
-tilts on its bearings; friction between bumpers.
+transfers within a poll (0.4 ms); vertical shocks, which would show in X + Y of the inclinometers; vehicles
+that tilt on their bearings; friction between bumpers.
 """
