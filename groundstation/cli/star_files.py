@@ -1,7 +1,10 @@
 """Files of the star-tracker commands: frames in, tables out; every refusal is one sentence."""
 
+import csv
+import math
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 
 from calibration.camera import CameraCalibration
 from groundstation.cli.errors import UsageError
+from groundstation.star_tracking.survey import Anchor
 
 _ENDINGS = {".png": b"IEND\xaeB`\x82", ".jpg": b"\xff\xd9", ".jpeg": b"\xff\xd9"}
 _SUFFIXES = frozenset({*_ENDINGS, ".bmp", ".pgm", ".tif", ".tiff"})
@@ -58,6 +62,42 @@ def read_frame(path: Path, camera: CameraCalibration) -> NDArray[np.uint8]:
             f"{camera.width} x {camera.height}."
         )
     return np.asarray(image, dtype=np.uint8)
+
+
+def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:
+    """Read anchors.csv: ``id,x_m,y_m,frame,u,v``; ``frames`` are the stems of the pictures in order.
+
+    Raises:
+        UsageError: The file is missing, a column is, or a value is no number or no frame.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UsageError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}).") from error
+    number = {stem: i for i, stem in enumerate(frames)}
+    anchors = []
+    for line, row in enumerate(rows, start=2):
+        for column in ("id", "x_m", "y_m", "frame", "u", "v"):
+            if row.get(column) is None:
+                raise UsageError(f"{path}: line {line}, column '{column}' is missing.")
+        if row["frame"] not in number:
+            raise UsageError(f"{path}: line {line}, there is no picture '{row['frame']}'.")
+        values = []
+        for column in ("x_m", "y_m", "u", "v"):
+            try:
+                value = float(row[column])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise UsageError(f"{path}: line {line}, {column} is '{row[column]}', expected a number.")
+            values.append(value)
+        anchors.append(Anchor(row["id"], values[0], values[1], number[row["frame"]], values[2], values[3]))
+    if len(anchors) < 2:
+        raise UsageError(f"{path}: holds {len(anchors)} anchors, a survey needs at least two.")
+    if len({anchor.name for anchor in anchors}) < len(anchors):
+        raise UsageError(f"{path}: an anchor's id appears twice.")
+    return anchors
 
 
 def write_atomically(path: Path, text: str) -> None:
