@@ -1,4 +1,4 @@
-"""Write a node of your own and let it fly: two mock-ups go round a rectangle, in virtual time.
+"""Write a node of your own and let it fly: two mock-ups go round rectangles, in virtual time.
 
     python examples/fly_a_square.py square.mcap --duration 130
     python examples/compare_with_truth.py square.mcap
@@ -26,8 +26,11 @@ from groundstation.runtime.provenance import recording_info
 from groundstation.runtime.rig import load_rig
 from groundstation.runtime.slot import NodeSlot, Sequences
 
+Corners = tuple[tuple[float, float], ...]
+
 RIG = Path(__file__).with_suffix(".toml")
-CORNERS = ((-1.2, -0.8), (1.2, -0.8), (1.2, 0.8), (-1.2, 0.8))
+OUTER = ((-1.4, -1.0), (1.4, -1.0), (1.4, 1.0), (-1.4, 1.0))
+INNER = ((-0.75, -0.4), (0.75, -0.4), (0.75, 0.4), (-0.75, 0.4))
 """x, y in the table frame (m), counter-clockwise; the nose points along the way."""
 THERE_M, THERE_RAD = 0.02, math.radians(2.0)
 
@@ -37,14 +40,16 @@ class Tour(Node):
 
     Args:
         vehicle: Whose goals they are.
-        first: Index of the corner it starts from.
+        corners: x, y of each (m).
+        first: Index of the corner that the rig lets it hold at the start.
     """
 
     inputs = (SequencePhase, ControlStatus)
     outputs = (Request,)
 
-    def __init__(self, vehicle: str, first: int) -> None:
+    def __init__(self, vehicle: str, corners: Corners, first: int) -> None:
         super().__init__(vehicle)
+        self._corners = corners
         self._corner = first
         self._is_flying = False
         self._asked = 0
@@ -54,17 +59,17 @@ class Tour(Node):
             case SequencePhase():
                 self._is_flying = message.phase == "flying"
             case ControlStatus() if self._is_flying:
-                goal = CORNERS[self._corner]
+                goal = self._corners[self._corner]
                 is_that_goal = math.dist(message.goal_position_table_m, goal) < 1e-9
                 is_there = message.error_position_m < THERE_M and abs(message.error_heading_rad) < THERE_RAD
                 if is_that_goal and is_there:
-                    self._corner = (self._corner + 1) % len(CORNERS)
+                    self._corner = (self._corner + 1) % len(self._corners)
                     self._asked += 1
                     yield Request(now_ns, self.vehicle, self._asked, "tour", "go_to", self._pose())
 
     def _pose(self) -> tuple[float, float, float]:
         """The corner, with the nose along the way that led there."""
-        (x0, y0), (x, y) = CORNERS[self._corner - 1], CORNERS[self._corner]
+        (x0, y0), (x, y) = self._corners[self._corner - 1], self._corners[self._corner]
         return x, y, math.atan2(y - y0, x - x0)
 
 
@@ -75,8 +80,8 @@ def fly(duration_s: float, observers: Sequence[Observer], seed: int = 1) -> None
     laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
     journal, sequences = JournalWriter(), Sequences()
     slots = build_slots(rig, None, journal, sequences, measure=False)
-    for vehicle, first in (("alpha", 0), ("beta", 2)):
-        tour = Tour(vehicle, first)
+    for vehicle, corners, first in (("alpha", OUTER, 0), ("beta", INNER, 2)):
+        tour = Tour(vehicle, corners, first)
         slots.append(NodeSlot(f"{vehicle}/tour", tour, "lockstep", 0, journal, sequences, measure=False))
     runner = LockstepRunner(slots, laboratory, ports_of(rig), observers, journal, sequences)
     try:

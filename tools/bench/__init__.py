@@ -1,0 +1,1 @@
+"""What ``make bench`` measures: one file per subject, each a function from a ``Bench`` to rows."""
