@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from groundstation.frames import wrap_angle
+from groundstation.fusion.error_state_filter import WAITS
 from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.messages.base import Message
@@ -117,7 +118,8 @@ class Fusion(Node):
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance)
         )
-        yield self._account(account, now_ns)
+        if account.reason != WAITS:  # it is accounted for when the packets up to its exposure are here
+            yield self._account(account, now_ns)
 
     def _account(self, account: Account, now_ns: int) -> FixAccount:
         self._used += account.used
