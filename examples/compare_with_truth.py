@@ -14,41 +14,51 @@ from groundstation.messages.definitions import ReferenceState, VehicleState
 from groundstation.recording.reader import Recording
 
 
-def poses(recording: Recording, kind: type[VehicleState] | type[ReferenceState], vehicle: str) -> np.ndarray:
-    """Rows of t (s), x, y (m), heading (rad, unwrapped), shape (n, 4)."""
-    found = (message.payload for message in recording.messages([topic_of(kind)], [vehicle]))
-    rows = np.array([(p.stamp_ns * 1e-9, *p.position_table_m, p.heading_rad) for p in found])
+def states(recording: Recording, vehicle: str) -> np.ndarray:
+    """Rows of t (s), x, y (m), heading (rad, unwrapped) and their standard deviations, shape (n, 7)."""
+    found = (message.payload for message in recording.messages([topic_of(VehicleState)], [vehicle]))
+    said = [state for state in found if isinstance(state, VehicleState)]
+    rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad, *s.pose_std) for s in said])
     rows[:, 3] = np.unwrap(rows[:, 3])
     return rows
 
 
-def sentence(of: np.ndarray) -> str:
-    """x, y (m) and heading (rad) for people."""
-    return f"x {of[0] * 1e3:.2f} mm, y {of[1] * 1e3:.2f} mm, heading {np.degrees(of[2]):.3f} deg"
+def truths(recording: Recording, vehicle: str) -> np.ndarray:
+    """Rows of t (s), x, y (m), heading (rad, unwrapped), shape (n, 4)."""
+    found = (message.payload for message in recording.messages([topic_of(ReferenceState)], [vehicle]))
+    said = [truth for truth in found if isinstance(truth, ReferenceState)]
+    rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad) for s in said])
+    rows[:, 3] = np.unwrap(rows[:, 3])
+    return rows
+
+
+def errors(state: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """State less truth at the moments of the states: x, y (m), heading (rad), shape (n, 3)."""
+    at_s = state[:, 0]
+    off = np.column_stack([state[:, i] - np.interp(at_s, truth[:, 0], truth[:, i]) for i in (1, 2, 3)])
+    off[:, 2] = (off[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    return off
+
+
+def sentence(values: np.ndarray) -> str:
+    """Root mean squares of rows of x, y (m), heading (rad), for people."""
+    x_m, y_m, heading_rad = np.sqrt(np.mean(values**2, axis=0))
+    return f"x {x_m * 1e3:.2f} mm, y {y_m * 1e3:.2f} mm, heading {np.degrees(heading_rad):.3f} deg"
 
 
 def main() -> None:
-    """Print one line per vehicle."""
+    """Print one line per vehicle that has a reference."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("recording", type=Path)
     with Recording(parser.parse_args().recording) as recording:
-        owners = {channel.owner for channel in recording.channels if channel.topic is topic_of(VehicleState)}
-        for vehicle in sorted(owners):
-            estimate, truth = (
-                poses(recording, VehicleState, vehicle),
-                poses(recording, ReferenceState, vehicle),
-            )
-            t_s = estimate[:, 0]
-            inside = (t_s >= truth[0, 0]) & (t_s <= truth[-1, 0])
-            errors = np.column_stack(
-                [estimate[inside, i] - np.interp(t_s[inside], truth[:, 0], truth[:, i]) for i in (1, 2, 3)]
-            )
-            errors[:, 2] = (errors[:, 2] + np.pi) % (2 * np.pi) - np.pi
-            claimed = [m.payload.pose_std for m in recording.messages([topic_of(VehicleState)], [vehicle])]
-            rms, std = np.sqrt(np.mean(errors**2, axis=0)), np.sqrt(np.mean(np.array(claimed) ** 2, axis=0))
-            print(f"{vehicle}: RMS error {sentence(rms)}; claimed {sentence(std)}")
+        for channel in recording.channels:
+            if channel.topic is topic_of(ReferenceState):
+                state, truth = states(recording, channel.owner), truths(recording, channel.owner)
+                state = state[(state[:, 0] >= truth[0, 0]) & (state[:, 0] <= truth[-1, 0])]
+                off = sentence(errors(state, truth))
+                print(f"{channel.owner}: RMS error {off}; claimed {sentence(state[:, 4:])}")
 
 
 if __name__ == "__main__":

@@ -48,9 +48,10 @@ def main() -> None:
     if arguments.picture is None:
         image = draw((x, y, math.radians(heading_deg)), arguments.camera, arguments.ceiling)
     else:
-        image = cv2.imread(str(arguments.picture), cv2.IMREAD_GRAYSCALE)
-        if image is None:
+        found = cv2.imread(str(arguments.picture), cv2.IMREAD_GRAYSCALE)
+        if found is None:
             parser.error(f"{arguments.picture} is no picture")
+        image = found.astype(np.uint8)
 
     tracker = StarTracker(StarCatalogue.load(arguments.ceiling), CameraCalibration.load(arguments.camera))
     answer = tracker.solve(detect(image))

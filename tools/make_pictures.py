@@ -72,7 +72,7 @@ class Flight:
 def to_table(pose: Array, points_body_m: Array) -> Array:
     """Points of the body (n, 2) in the table, for a pose x, y, heading."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    return points_body_m @ np.array([[c, s], [-s, c]]) + pose[:2]
+    return np.asarray(points_body_m @ np.array([[c, s], [-s, c]]) + pose[:2])
 
 
 def draw_table(axes: Axes, flight: Flight, catalogue: StarCatalogue, seen: NDArray[np.int64]) -> None:
@@ -105,7 +105,9 @@ def draw_table(axes: Axes, flight: Flight, catalogue: StarCatalogue, seen: NDArr
                 Polygon(to_table(pose, view[:, :2]), fill=False, ec=STAR, alpha=0.5, lw=0.8, zorder=3)
             )
         draw_mock_up(axes, pose, colour, flight.open_mask.get(name, 0))
-        axes.annotate(name, pose[:2], xytext=(0, -34), textcoords="offset points", color=colour, ha="center")
+        axes.annotate(
+            name, (pose[0], pose[1]), xytext=(0, -34), textcoords="offset points", color=colour, ha="center"
+        )
     axes.set_xlim(-2.35, 2.35)
     axes.set_ylim(-1.85, 1.85)
     axes.set_aspect("equal")

@@ -16,7 +16,10 @@ _VERDICTS = {"yes": True, "no": False, "": None}
 
 def parse_row(line: str) -> Row | None:
     """The row of a line, None for any other line."""
-    cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+    line = line.strip()
+    if line.startswith("|"):  # as a table of Markdown
+        line = line[1:].removesuffix("|")
+    cells = [cell.strip() for cell in line.split("|")]
     if len(cells) != 4 or cells[3].lower() not in _VERDICTS:
         return None
     what, limit, measured, verdict = cells
