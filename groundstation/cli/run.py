@@ -13,12 +13,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from groundstation.cli.errors import UsageError
+from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.recording.writer import PART_SUFFIX
+from groundstation.runtime.errors import GroundStationError
 from groundstation.runtime.live_run import LiveRun
 from groundstation.runtime.lockstep_run import run_lockstep
 from groundstation.runtime.node_table import check_rig
 from groundstation.runtime.plan import check_addresses, processes_of
-from groundstation.runtime.report import write_report
 from groundstation.runtime.rig import load_rig
 
 app = typer.Typer(rich_markup_mode=None)
@@ -65,12 +67,24 @@ def run(
         if seed is not None:
             raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
         _run_live(LiveRun(loaded, rig, recording), duration, headless=headless or not sys.stdout.isatty())
-    print(f"recording: {recording}")
+    finished = _say_recordings(recording)
     if report is not None:
-        with _progress(1.0) as update:
-            written = write_report(recording, report, update)
-        for path in written:
-            print(f"report: {path}")
+        if not finished:
+            raise GroundStationError("there is no report: no recording was finished")
+        print_report(finished[-1], report)
+
+
+def _say_recordings(recording: Path) -> list[Path]:
+    """Name the files of a run; a recorder that was started again left several. Returns the finished ones."""
+    every = [recording, *sorted(recording.parent.glob(f"{recording.stem}_[0-9]*{recording.suffix}*"))]
+    torn = recording.with_name(recording.name + PART_SUFFIX)
+    finished = [path for path in every if path.suffix == recording.suffix and path.exists()]
+    for path in finished:
+        print(f"recording: {path}")
+    for path in [torn, *every]:
+        if path.name.endswith(PART_SUFFIX) and path.exists():
+            print(f"not finished: {path} (groundstation recording recover brings back what it holds)")
+    return finished
 
 
 class _Ending:

@@ -1,5 +1,6 @@
 """A whole live run of a rig: launcher, monitor and ledger; what the terminal view looks at."""
 
+import os
 import queue
 import time
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from groundstation.messages.cdr import CodecError
 from groundstation.runtime.launcher import Launcher
 from groundstation.runtime.monitor import Monitor
 from groundstation.runtime.rig import Rig
+from groundstation.runtime.running import RunningRig
 
 LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05
@@ -38,6 +40,7 @@ class LiveRun:
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
+        self._announcement: Path | None = None
 
     @property
     def is_ready(self) -> bool:
@@ -49,6 +52,8 @@ class LiveRun:
         if is_unwanted():
             return
         self.launcher.start()
+        run = RunningRig(os.getpid(), self.rig.name, self.launcher.endpoint, tuple(self.rig.vehicles))
+        self._announcement = run.announce()
         bus = self.launcher.bus
         assert bus is not None
         for topic in TOPICS:
@@ -68,6 +73,8 @@ class LiveRun:
 
     def close(self) -> None:
         """End everything in good order."""
+        if self._announcement is not None:
+            self._announcement.unlink(missing_ok=True)
         self.launcher.close()
 
     def _listen(self, until_s: float) -> None:

@@ -1,0 +1,89 @@
+"""Where a running rig can be found: a small file per run in the user's run-time folder.
+
+The file is written when the hub is open and removed when the run ends. A run that was killed leaves its
+file behind; whoever looks for runs removes it then.
+"""
+
+import contextlib
+import json
+import os
+import stat
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from groundstation.runtime.errors import GroundStationError
+
+
+@dataclass(frozen=True)
+class RunningRig:
+    """One run.
+
+    Attributes:
+        pid: Of the launcher.
+        rig: The rig's name.
+        endpoint: Of the hub.
+        vehicles: Names of its vehicles.
+    """
+
+    pid: int
+    rig: str
+    endpoint: str
+    vehicles: tuple[str, ...]
+
+    def announce(self) -> Path:
+        """Write the file that others find this run by.
+
+        Raises:
+            GroundStationError: The folder belongs to somebody else or cannot be written.
+        """
+        path = _folder() / f"{self.pid}.json"
+        partial = path.with_suffix(".part")
+        try:
+            partial.write_text(json.dumps(asdict(self)))
+            partial.replace(path)
+        except OSError as error:
+            raise GroundStationError(f"{path} cannot be written: {error.strerror}") from error
+        return path
+
+
+def find_running() -> list[RunningRig]:
+    """Every run of this user that is going on, oldest process number first."""
+    found = []
+    for path in sorted(_folder().glob("*.json")):
+        try:
+            said = json.loads(path.read_text())
+            run = RunningRig(said["pid"], said["rig"], said["endpoint"], tuple(said["vehicles"]))
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # being removed just now, or not ours
+        if _lives(run.pid):
+            found.append(run)
+        else:
+            path.unlink(missing_ok=True)
+    return sorted(found, key=lambda run: run.pid)
+
+
+def _folder() -> Path:
+    """The user's own folder: in XDG_RUNTIME_DIR, else in the folder for temporary files."""
+    base = os.environ.get("XDG_RUNTIME_DIR", "")
+    if base and Path(base).is_dir() and os.access(base, os.W_OK):
+        folder = Path(base) / "groundstation"
+    else:
+        folder = Path(tempfile.gettempdir()) / f"groundstation-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        raise GroundStationError(f"{folder} cannot be made: {error.strerror}") from error
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise GroundStationError(f"{folder} belongs to somebody else: remove it")
+    return folder
+
+
+def _lives(pid: int) -> bool:
+    with contextlib.suppress(PermissionError):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return False
+    return True

@@ -1,0 +1,63 @@
+"""A request that cannot be sent is refused in one sentence; runs find each other by their files."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from groundstation.cli.main import main
+from groundstation.runtime.running import RunningRig, find_running
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path / "groundstation"
+
+
+def refused(capsys, monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["groundstation", "request", *words])
+    with pytest.raises(SystemExit) as ending:
+        main()
+    assert ending.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["alpha", "fly"], "there is no action 'fly' (there are arm, "),
+        (["alpha", "go_to", "0.1"], "go_to takes x_m y_m heading_deg, found 1 numbers"),
+        (["alpha", "go_to", "-0.1", "nan", "3"], "finite"),
+        (["alpha", "stop"], "no rig is running"),
+        (["alpha", "stop", "--pid", "1"], "no rig is running with process 1"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(words, reason, capsys, monkeypatch):
+    assert reason in refused(capsys, monkeypatch, *words)
+
+
+def test_the_vehicle_must_be_flown_by_exactly_one_run(capsys, monkeypatch):
+    RunningRig(os.getpid(), "one", "tcp/127.0.0.1:1", ("alpha", "beta")).announce()
+    RunningRig(os.getppid(), "other", "tcp/127.0.0.1:2", ("alpha",)).announce()
+    assert "no vehicle 'gamma' is running" in refused(capsys, monkeypatch, "gamma", "stop")
+    assert "choose one with --pid" in refused(capsys, monkeypatch, "alpha", "stop")
+
+
+def test_a_run_is_found_while_it_lives_and_forgotten_after(own_folder):
+    path = RunningRig(os.getpid(), "one", "tcp/127.0.0.1:1", ("alpha",)).announce()
+    dead = subprocess.run(
+        [sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True
+    )
+    left = own_folder / "dead.json"
+    left.write_text(json.dumps({"pid": int(dead.stdout), "rig": "x", "endpoint": "y", "vehicles": []}))
+    (own_folder / "torn.json").write_text("{")
+    assert [run.rig for run in find_running()] == ["one"]
+    assert not left.exists()
+    path.unlink()
+    assert find_running() == []
