@@ -52,6 +52,8 @@ class Laboratory:
     knock_m_s2: float = 0.02
     """Of one poll in the three milliseconds after a valve switches."""
     outage_s: tuple[float, float] | None = None
+    table_seed: int | None = None
+    """The same table under other noise, for maps."""
     faults: bool = True
     acc_matrix_sigma: float = 0.008
     """Of the accelerometers' scale and of the angles between their axes and the body's."""
@@ -236,7 +238,8 @@ def make(lab: Laboratory) -> DataSet:
     rng = np.random.default_rng([lab.seed, SCENARIOS.index(lab.scenario)])
     if lab.scenario == "outage" and lab.outage_s is None:
         lab.outage_s = (60.0, 70.0)
-    table = Table(rng, lab.waviness_m_s2)
+    table_rng = rng if lab.table_seed is None else np.random.default_rng([lab.table_seed, 99])
+    table = Table(table_rng, lab.waviness_m_s2)
     if lab.scenario == "rest":
         lab.run_start_s = lab.duration_s
     truth = _fly(lab, rng, table)

@@ -16,6 +16,7 @@ from calibration.imu.gyro_scale import GyroScale
 from calibration.imu.temperature import TemperatureSlope
 from calibration.imu.zero_offset import ZeroOffset
 from groundstation.cli.errors import UsageError
+from groundstation.fusion.table_map import TableMap
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 def _save(figure: Figure, path: Path) -> None:
     """Write a PNG whole or not at all."""
     FigureCanvasAgg(figure)
-    figure.set_layout_engine("constrained")
     part = path.with_name(f".{path.name}.part")
     try:
         figure.savefig(part, format="png", dpi=110)
@@ -40,7 +40,7 @@ def _axes(figure: Figure, rows: int) -> list[Any]:
 
 def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
     """Draw the rest's packets (n, 5), its mean, and what was cut out."""
-    figure = Figure(figsize=(9, 7))
+    figure = Figure(figsize=(9, 7), layout="constrained")
     for k, (axes, label) in enumerate(
         zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
     ):
@@ -57,7 +57,7 @@ def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
 
 def plot_temperature(found: TemperatureSlope, path: Path) -> None:
     """Draw block means against temperature with the fitted lines."""
-    figure = Figure(figsize=(8, 7))
+    figure = Figure(figsize=(8, 7), layout="constrained")
     heat = found.block_temperature_c
     for k, (axes, label) in enumerate(
         zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
@@ -72,7 +72,7 @@ def plot_temperature(found: TemperatureSlope, path: Path) -> None:
 
 def plot_scale(found: GyroScale, path: Path) -> None:
     """Draw the heading residuals of the turns."""
-    figure = Figure(figsize=(8, 4))
+    figure = Figure(figsize=(8, 4), layout="constrained")
     (axes,) = _axes(figure, 1)
     residual = np.degrees(found.residual_rad)
     axes.plot(found.fix_s[found.is_used], residual[found.is_used], ".", label=f"{found.used} used")
@@ -88,7 +88,7 @@ def plot_scale(found: GyroScale, path: Path) -> None:
 
 def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: Path) -> None:
     """Draw the Allan deviations with their white-noise slopes."""
-    figure = Figure(figsize=(8, 8))
+    figure = Figure(figsize=(8, 8), layout="constrained")
     for axes, (name, curve) in zip(_axes(figure, len(curves)), curves.items(), strict=True):
         axes.errorbar(curve.tau_s, curve.deviation, curve.std, fmt=".-", markersize=3, linewidth=0.8)
         axes.plot(
@@ -100,4 +100,43 @@ def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: P
         axes.set_ylabel(f"{name}, {units[name]}")
         axes.legend(fontsize=8)
     axes.set_xlabel("averaging time, s")
+    _save(figure, path)
+
+
+def plot_residuals(residual: Array, nis: Array, path: Path) -> None:
+    """Draw fix less smoothed pose (m, 4: s, m, m, rad), and the filter's NIS."""
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    axes = _axes(figure, 4)
+    for k, (label, factor) in enumerate((("x, mm", 1e3), ("y, mm", 1e3), ("heading, °", 180.0 / np.pi))):
+        axes[k].plot(residual[:, 0], factor * residual[:, k + 1], ".", markersize=4)
+        axes[k].axhline(0.0, color="0.6", linewidth=0.8)
+        axes[k].set_ylabel(label)
+    axes[3].plot(residual[:, 0], nis[: len(residual)], ".", markersize=4)
+    axes[3].axhline(3.0, color="tab:blue", linewidth=0.8, label="expected mean")
+    axes[3].set_ylabel("NIS")
+    axes[3].legend()
+    axes[3].set_xlabel("exposure, s")
+    _save(figure, path)
+
+
+def plot_map(grid: TableMap, flown_m: Array, path: Path) -> None:
+    """Draw the pull along both axes and its sigma as heat maps, with the paths flown."""
+    figure = Figure(figsize=(8, 12), layout="constrained")
+    rows, columns = grid.pull_x_m_s2.shape
+    half = grid.step_m / 2.0
+    extent = (
+        grid.x0_m - half, grid.x0_m + (columns - 1) * grid.step_m + half,
+        grid.y0_m - half, grid.y0_m + (rows - 1) * grid.step_m + half,
+    )  # fmt: skip
+    fields = (
+        (grid.pull_x_m_s2, "pull along x, mm/s²", "coolwarm"),
+        (grid.pull_y_m_s2, "pull along y, mm/s²", "coolwarm"),
+        (grid.std_m_s2, "sigma, mm/s²", "viridis"),
+    )
+    for axes, (field, label, colours) in zip(_axes(figure, 3), fields, strict=True):
+        image = axes.imshow(1e3 * field, origin="lower", extent=extent, cmap=colours)
+        axes.plot(flown_m[:, 0], flown_m[:, 1], ",", color="k", alpha=0.5)
+        figure.colorbar(image, ax=axes, label=label)
+        axes.set_ylabel("y, m")
+    axes.set_xlabel("x, m")
     _save(figure, path)

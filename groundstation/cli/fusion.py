@@ -14,10 +14,14 @@ import typer
 
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
+from groundstation.cli.table_map_file import read_map
+from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.stamp_ticks import StampTicks
+from groundstation.fusion.table_map import noise_with
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
@@ -43,6 +47,9 @@ def run(
     folder: Annotated[Path, typer.Argument(help="Folder with imu.csv, stars.csv and meta.json.")],
     out: Annotated[Path, typer.Option(help="CSV to write, a row per packet; fixes.csv goes beside it.")],
     method: Annotated[str, typer.Option(help=f"One of: {', '.join(ESTIMATORS)}.")] = "filter",
+    table_map: Annotated[
+        Path | None, typer.Option(help="Map of the table's slope, made by `calibrate table-map`.")
+    ] = None,
     smooth: Annotated[bool, typer.Option("--smooth", help="Look ahead as well: for recordings.")] = False,
 ) -> None:
     """Estimate the motion in a data set; causal, as if it were live, unless --smooth.
@@ -53,8 +60,10 @@ def run(
         raise UsageError(f"--method must be one of {', '.join(ESTIMATORS)}, found {method!r}.")
     if smooth and method != "filter":
         raise UsageError(f"--smooth works on the filter, not on --method {method}.")
+    if table_map is not None and method != "filter":
+        raise UsageError(f"--table-map works on the filter, not on --method {method}.")
     data = read_folder(folder)
-    estimator = OfflineSmoother(data.noise) if smooth else ESTIMATORS[method](data.noise)
+    estimator = _estimator(data.noise, method, table_map, smooth=smooth)
     states, accounts = estimate(data, estimator)
     if isinstance(estimator, OfflineSmoother):
         later = iter(estimator.states())
@@ -66,6 +75,16 @@ def run(
         }
     )
     _summarise(states, accounts, estimator)
+
+
+def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth: bool) -> Estimator:
+    known = None
+    if table_map is not None:
+        known = read_map(table_map)
+        noise = noise_with(noise, known)
+    if smooth:
+        return OfflineSmoother(noise, known)
+    return ErrorStateFilter(noise, table_map=known) if known else ESTIMATORS[method](noise)
 
 
 def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:

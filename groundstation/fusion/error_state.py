@@ -1,4 +1,4 @@
-"""The 22 error states of the filter: what they mean, how they start and how they age.
+"""The 23 error states of the filter: what they mean, how they start and how they age.
 
 Notation: theta heading, v and p velocity and position of the IMU point in the table frame, w rate, f specific
 force at the IMU point in body axes, R(theta) = table_from_body. Between packets
@@ -34,13 +34,15 @@ WAVE_X, WAVE_Y = 13, 14
 ACC_MATRIX = 15  # xx, xy, yx, yy of M
 GYRO_TEMPCO = 19
 ACC_TEMPCO_X, ACC_TEMPCO_Y = 20, 21
-SIZE = 22
+FIX_DELAY = 22
+"""How much later than stamped an exposure was, s."""
+SIZE = 23
 MOVING = 5
 """The first five states move with the packets; the others are constants or slow walks."""
 
 
 def initial_state(noise: NoiseModel) -> Array:
-    """Return the nominal state (22,) before any measurement."""
+    """Return the nominal state (23,) before any measurement."""
     x = np.zeros(SIZE)
     x[LEVER_X] = noise.imu_offset_x_m
     x[LEVER_Y] = noise.imu_offset_y_m
@@ -50,7 +52,7 @@ def initial_state(noise: NoiseModel) -> Array:
 
 
 def initial_variance(noise: NoiseModel) -> Array:
-    """Return the variances (22,) before any measurement; pose and velocity are zero, a fix sets them."""
+    """Return the variances (23,) before any measurement; pose and velocity are zero, a fix sets them."""
     sigma = np.zeros(SIZE)
     sigma[GYRO_BIAS] = noise.gyro_bias_sigma_rad_s
     sigma[ACC_BIAS_X : ACC_BIAS_Y + 1] = noise.acc_bias_sigma_m_s2
@@ -61,11 +63,12 @@ def initial_variance(noise: NoiseModel) -> Array:
     sigma[ACC_MATRIX : ACC_MATRIX + 4] = noise.acc_scale_sigma
     sigma[GYRO_TEMPCO] = noise.tempco_sigma_ratio * abs(noise.gyro_tempco_rad_s_c)
     sigma[ACC_TEMPCO_X : ACC_TEMPCO_Y + 1] = noise.tempco_sigma_ratio * abs(noise.acc_tempco_m_s2_c)
+    sigma[FIX_DELAY] = noise.fix_delay_sigma_s
     return sigma**2
 
 
 def move(P: Array, F: Array, Q: Array) -> None:
-    """Carry the covariance P (22, 22) over a segment in place, given its five moving rows."""
+    """Carry the covariance P (23, 23) over a segment in place, given its five moving rows."""
     rows = F @ P
     corner = rows @ F.T + Q
     P[:MOVING] = rows
@@ -74,7 +77,7 @@ def move(P: Array, F: Array, Q: Array) -> None:
 
 
 def reopened_variance() -> Array:
-    """Return upper limits (22,) of the variances with which a filter that lost itself begins again."""
+    """Return upper limits (23,) of the variances with which a filter that lost itself begins again."""
     sigma = np.full(SIZE, np.inf)
     sigma[GYRO_BIAS] = 0.02
     sigma[ACC_BIAS_X : ACC_BIAS_Y + 1] = 0.02
@@ -90,7 +93,7 @@ def age(P: Array, duration_s: float, noise: NoiseModel) -> None:
 
 
 def full_transition(rows: Array, keep: float) -> Array:
-    """Return the transition (22, 22) of a segment: five moving rows, a fading wave, constants."""
+    """Return the transition (23, 23) of a segment: five moving rows, a fading wave, constants."""
     F = np.eye(SIZE)
     F[:MOVING] = rows
     F[WAVE_X, WAVE_X] = F[WAVE_Y, WAVE_Y] = keep
@@ -106,8 +109,8 @@ def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> float
     how often this is called.
 
     Args:
-        x: (22,) nominal state where the vehicle is now.
-        P: (22, 22) its covariance.
+        x: (23,) nominal state where the vehicle is now.
+        P: (23, 23) its covariance.
         anchor_m: (3,) x, y of the anchor and the largest distance from it so far; updated.
         noise: sigma and length of the waviness.
 

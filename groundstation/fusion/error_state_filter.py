@@ -19,6 +19,7 @@ from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.reckoner import Reckoner
+from groundstation.fusion.table_map import TableMap
 from groundstation.fusion.trace import Carried, Chain, Corrected, Trace
 
 STEP_S = 1.0
@@ -31,6 +32,8 @@ WAITS = "waits for packets"
 CANDIDATE = "waits for a second fix"
 CANDIDATE_AGE_S = 5.0
 """A first fix is compared with those up to this long after it."""
+MAX_PLAUSIBLE = 1e3
+"""No table is a kilometre wide, and no fix's heading is that many radians."""
 MAX_SPEED_M_S = 0.2
 """Nothing on a table flies faster; bounds what two first fixes may differ by."""
 AGREEMENT_SIGMAS = 6.0
@@ -42,18 +45,22 @@ class ErrorStateFilter:
     Args:
         noise: sensors and table of this mock-up.
         trace: where to write down every step for a smoother; all packets are then kept.
+        table_map: what calibration knows of the table's slope; the filter estimates what is left of it.
     """
 
-    def __init__(self, noise: NoiseModel, trace: Trace | None = None) -> None:
+    def __init__(
+        self, noise: NoiseModel, trace: Trace | None = None, table_map: TableMap | None = None
+    ) -> None:
         self.noise = noise
+        self._map = table_map
         self._trace = trace
         self.counters = Counters()
         self.x = es.initial_state(noise)
-        """(22,) nominal state at the checkpoint."""
+        """(23,) nominal state at the checkpoint."""
         self.P = np.diag(es.initial_variance(noise))
-        """(22, 22) covariance there."""
+        """(23, 23) covariance there."""
         self._anchor = np.zeros(3)
-        self._reckoner = Reckoner(noise, self.counters)
+        self._reckoner = Reckoner(noise, self.counters, table_map)
         self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
         self._candidates: list[Fix] = []
         self._rests: list[tuple[float, float]] = []
@@ -123,6 +130,8 @@ class ErrorStateFilter:
     def _judge(self, fix: Fix) -> FixAccount:
         if not np.isfinite([fix.x_m, fix.y_m, fix.heading_rad, *fix.cov.flat]).all():
             return self._refuse(fix, "not finite")
+        if max(abs(fix.x_m), abs(fix.y_m), abs(fix.heading_rad)) > MAX_PLAUSIBLE:
+            return self._refuse(fix, "not on any table")
         reckoner = self._reckoner
         t = self._seconds(fix.t_exposure_ns)
         if reckoner.origin_ns is None or (len(reckoner.history) and t < reckoner.history.first_s):
@@ -280,7 +289,7 @@ class ErrorStateFilter:
                 F = measurements.stand(x, P)
                 es.age(P, b - a, self.noise)
             elif len(segment.span_s):
-                flight = fly(x, segment, self._lag_difference_s)
+                flight = fly(x, segment, self._lag_difference_s, self._map)
                 rows = transition(segment, flight)
                 es.move(P, rows, moving_noise(segment, flight, self.noise))
                 x[: es.MOVING] = flight.moved
@@ -310,7 +319,7 @@ class ErrorStateFilter:
 
     def _learn(self, x: Array, P: Array, segment: Segment) -> Corrected | None:
         try:
-            return measurements.learn_rest(x, P, segment, self.noise)
+            return measurements.learn_rest(x, P, segment, self.noise, self._map)
         except measurements.RestDisturbed:
             self.counters.add("rest_disturbed")
             return None
@@ -339,7 +348,7 @@ class ErrorStateFilter:
             if resting:
                 x[es.VX : es.VY + 1] = 0.0
             elif len(segment.span_s):
-                x[: es.MOVING] = fly(x, segment, self._lag_difference_s).moved
+                x[: es.MOVING] = fly(x, segment, self._lag_difference_s, self._map).moved
         self._reckoner.load(x, x[: es.MOVING])
         self._reckoner.variance = measurements.variance_in_time(self.x, self.P, self.noise)
 

@@ -35,6 +35,7 @@ from groundstation.fusion.error_state import (
 )
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import Segment
+from groundstation.fusion.table_map import TableMap
 
 Array = NDArray[np.float64]
 
@@ -61,14 +62,15 @@ class Flight:
     """(n,) from the middle of each packet to the end of the segment."""
 
 
-def fly(x: Array, segment: Segment, lag_difference_s: float) -> Flight:
+def fly(x: Array, segment: Segment, lag_difference_s: float, table_map: TableMap | None = None) -> Flight:
     """Integrate a segment from the nominal state.
 
     Args:
-        x: (22,) nominal state at the segment's start.
+        x: (23,) nominal state at the segment's start.
         segment: packets; body frame.
         lag_difference_s: the gyro's low-pass time constant less the accelerometers'; forces are as old as
             their filter, so they are turned by the heading of that moment.
+        table_map: what is known of the slope beforehand; the states hold what is not.
     """
     dt = segment.span_s
     warmth = segment.warmth_k
@@ -91,7 +93,12 @@ def fly(x: Array, segment: Segment, lag_difference_s: float) -> Flight:
     duration = float(elapsed[-1]) if len(dt) else 0.0
     until_end = duration - elapsed + 0.5 * dt
     gx, gy = x[SLOPE_X] + x[WAVE_X], x[SLOPE_Y] + x[WAVE_Y]
-    push = a * dt
+    pulled = a
+    if table_map is not None:
+        # the path to look it up along needs no more than a centimetre
+        began = elapsed - 0.5 * dt
+        pulled = a + table_map.along(x[PX] + x[VX] * began, x[PY] + x[VY] * began)
+    push = pulled * dt
     moved = np.empty(MOVING)
     moved[THETA] = x[THETA] + (after[-1] if len(dt) else 0.0)
     moved[VX] = x[VX] + push[0].sum() + gx * duration
@@ -103,7 +110,7 @@ def fly(x: Array, segment: Segment, lag_difference_s: float) -> Flight:
 
 
 def transition(segment: Segment, flight: Flight) -> Array:
-    """Return the five moving rows (5, 22) of the error transition over a segment."""
+    """Return the five moving rows (5, 23) of the error transition over a segment."""
     T = flight.duration_s
     dt = segment.span_s
     c, s = np.cos(flight.theta_mid), np.sin(flight.theta_mid)

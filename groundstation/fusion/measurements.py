@@ -11,6 +11,7 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion.estimator import Fix
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import Segment
+from groundstation.fusion.table_map import TableMap
 from groundstation.fusion.trace import Corrected
 
 Array = NDArray[np.float64]
@@ -23,15 +24,15 @@ MAX_REST_SPREAD = 2.5
 
 
 def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) -> tuple[Array, Array]:
-    """Return innovation (3,) of x, y, heading and its Jacobian (3, 22) at the exposure.
+    """Return innovation (3,) of x, y, heading and its Jacobian (3, 23) at the exposure.
 
     The star camera sees the body's origin now; the state is the IMU point's, seen through the sensors'
     low-pass filters. For a first-order filter the lag is undone exactly: heading + lag * rate, p + lag * v.
 
     Args:
         fix: pose of the body's origin.
-        x: (22,) nominal state at the exposure.
-        omega_read_rad_s: the gyro's reading at the exposure; used only with a lag.
+        x: (23,) nominal state at the exposure.
+        omega_read_rad_s: the gyro's reading at the exposure.
         noise: lags.
     """
     H = np.zeros((3, es.SIZE))
@@ -41,13 +42,16 @@ def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) 
     rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
     lx, ly = c * rx - s * ry, s * rx + c * ry
     lag = noise.acc_lag_s
+    late = x[es.FIX_DELAY]
+    rate = (x[es.VX] + w * ly, x[es.VY] - w * lx, w)
     z = np.array(
         [
-            fix.x_m - (x[es.PX] + lag * x[es.VX] - lx),
-            fix.y_m - (x[es.PY] + lag * x[es.VY] - ly),
-            math.remainder(fix.heading_rad - theta, math.tau),
+            fix.x_m - (x[es.PX] + lag * x[es.VX] - lx + late * rate[0]),
+            fix.y_m - (x[es.PY] + lag * x[es.VY] - ly + late * rate[1]),
+            math.remainder(fix.heading_rad - theta - late * w, math.tau),
         ]
     )
+    H[:, es.FIX_DELAY] = rate
     H[0, es.PX] = H[1, es.PY] = H[2, es.THETA] = 1.0
     H[0, es.VX] = H[1, es.VY] = lag
     H[0, es.THETA], H[1, es.THETA] = ly, -lx
@@ -68,8 +72,8 @@ def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_si
 
     Args:
         fix: pose of the body's origin.
-        x: (22,) nominal state.
-        P: (22, 22) covariance.
+        x: (23,) nominal state.
+        P: (23, 23) covariance.
         near_heading_rad: the heading is unwrapped to lie within half a turn of this.
         velocity_sigma_m_s: how fast the vehicle may be; the velocity is set to zero.
     """
@@ -92,7 +96,7 @@ def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_si
 
 
 def stand(x: Array, P: Array) -> Array:
-    """Stop the vehicle in place: velocity zero, as known as can be; return the transition (22, 22)."""
+    """Stop the vehicle in place: velocity zero, as known as can be; return the transition (23, 23)."""
     v = slice(es.VX, es.VY + 1)
     x[v] = 0.0
     P[v] = 0.0
@@ -107,7 +111,9 @@ class RestDisturbed(ValueError):  # noqa: N818 - it is a finding about the data
     """The readings spread too wide for a rest."""
 
 
-def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> Corrected | None:
+def learn_rest(
+    x: Array, P: Array, segment: Segment, noise: NoiseModel, table_map: TableMap | None = None
+) -> Corrected | None:
     """Correct biases and slope in place by the mean of packets at rest.
 
     At rest the accelerometers read bias - R(heading)^T slope, the gyro its bias.
@@ -132,6 +138,9 @@ def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> Corre
     warmth = float(segment.warmth_k[good].mean())
     c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
     gx, gy = x[es.SLOPE_X] + x[es.WAVE_X], x[es.SLOPE_Y] + x[es.WAVE_Y]
+    if table_map is not None:
+        known_x, known_y = table_map.at(float(x[es.PX]), float(x[es.PY]))
+        gx, gy = gx + known_x, gy + known_y
     H = np.zeros((3, es.SIZE))
     H[0, es.GYRO_BIAS], H[0, es.GYRO_TEMPCO] = 1.0, warmth
     H[1, es.ACC_BIAS_X], H[1, es.ACC_TEMPCO_X] = 1.0, warmth
@@ -156,7 +165,7 @@ def learn_rest(x: Array, P: Array, segment: Segment, noise: NoiseModel) -> Corre
 
 
 def reported(x: Array, omega_rad_s: float) -> Array:
-    """Return the Jacobian (6, 22) of x, y, heading, vx, vy, omega of the centre of mass."""
+    """Return the Jacobian (6, 23) of x, y, heading, vx, vy, omega of the centre of mass."""
     H = np.zeros((6, es.SIZE))
     c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
     rx, ry = x[es.LEVER_X], x[es.LEVER_Y]

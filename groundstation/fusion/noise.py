@@ -26,6 +26,9 @@ class NoiseModel:
     fix_time_sigma_s: float = 0.0
     """Of an exposure's stamp against the packets', unless the fix's covariance holds it already."""
 
+    fix_delay_sigma_s: float = 0.0
+    """Of the constant part of it: how well the camera's delay was calibrated; 0 leaves it alone."""
+
     imu_offset_x_m: float = 0.0
     """Accelerometers from the centre of mass, body frame."""
     imu_offset_y_m: float = 0.0
@@ -54,6 +57,10 @@ class NoiseModel:
     gyro_lag_s: float = 0.0
     """Time constant of the gyro's low-pass, 1 / (2 pi f)."""
     acc_lag_s: float = 0.0
+    full_scale_rad_s: float = 8.7
+    """Beyond is not a reading; ADIS16100: its converter ends at 499 deg/s."""
+    full_scale_m_s2: float = 3.1
+    """Beyond is not a reading; SCA103T-D04: its converter ends at 18.2 deg."""
     max_acc_step_m_s2: float = 0.09
     """Largest change of the motion between packets, twice the valves'; the white noise is added to it."""
     max_rate_step_rad_s: float = math.radians(2.0)

@@ -6,6 +6,7 @@ from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.smoother import Smoothed, smooth
+from groundstation.fusion.table_map import TableMap
 from groundstation.fusion.trace import Trace
 
 
@@ -14,12 +15,14 @@ class OfflineSmoother:
 
     Args:
         noise: sensors and table of this mock-up.
+        table_map: what calibration knows of the table's slope.
     """
 
-    def __init__(self, noise: NoiseModel) -> None:
+    def __init__(self, noise: NoiseModel, table_map: TableMap | None = None) -> None:
         self.noise = noise
-        self._trace = Trace()
-        self._filter = ErrorStateFilter(noise, self._trace)
+        self.trace = Trace()
+        self._map = table_map
+        self._filter = ErrorStateFilter(noise, self.trace, table_map)
         self.counters = self._filter.counters
         self._rows: list[tuple[int, int]] = []  # stamp and row in the history, -1 for a refused packet
         self._is_finished = False
@@ -61,7 +64,7 @@ class OfflineSmoother:
         if not self._is_finished:
             self._filter.finish()
             self._is_finished = True
-        return smooth(self._trace, self._filter.history, self.noise)
+        return smooth(self.trace, self._filter.history, self.noise, self._map)
 
     def states(self) -> list[PlanarState | None]:
         """End the recording; return the smoothed state for each packet given, None where there is none."""

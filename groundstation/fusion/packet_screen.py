@@ -17,9 +17,11 @@ class PacketScreen:
     not. The limits are the rig's: largest force and torque over mass and inertia, plus noise.
     """
 
-    __slots__ = ("_last", "_max_acc", "_max_rate", "_suspect")
+    __slots__ = ("_full_acc", "_full_rate", "_last", "_max_acc", "_max_rate", "_suspect")
 
     def __init__(self, noise: NoiseModel) -> None:
+        self._full_rate = noise.full_scale_rad_s
+        self._full_acc = noise.full_scale_m_s2
         per_packet = NOISE_SIGMAS * math.sqrt(2.0 / noise.packet_period_s)
         self._max_acc = noise.max_acc_step_m_s2 + per_packet * noise.acc_density_m_s2_rthz
         self._max_rate = noise.max_rate_step_rad_s + per_packet * noise.gyro_density_rad_s_rthz
@@ -34,11 +36,10 @@ class PacketScreen:
         """Return whether the packet shall not be integrated; NaN and infinity are wild."""
         last = self._last
         if last is None:
-            # differences with itself are NaN for NaN and infinity, and NaN is not <= 0
-            if omega - omega <= 0.0 and ax - ax <= 0.0 and ay - ay <= 0.0:
-                self._last = (omega, ax, ay)
-                return False
-            return True
+            if self._is_beyond_scale(omega, ax, ay):
+                return True
+            self._last = (omega, ax, ay)
+            return False
         rate, force = self._max_rate, self._max_acc
         if (
             -rate <= omega - last[0] <= rate
@@ -49,6 +50,8 @@ class PacketScreen:
             self._suspect = None
             return False
         suspect = self._suspect
+        if self._is_beyond_scale(omega, ax, ay):
+            return True
         if (
             suspect is not None
             and -rate <= omega - suspect[0] <= rate
@@ -60,3 +63,8 @@ class PacketScreen:
             return False
         self._suspect = (omega, ax, ay)
         return True
+
+    def _is_beyond_scale(self, omega: float, ax: float, ay: float) -> bool:
+        """Whether no sensor can have read this; NaN and infinity among it."""
+        rate, force = self._full_rate, self._full_acc
+        return not (-rate <= omega <= rate and -force <= ax <= force and -force <= ay <= force)

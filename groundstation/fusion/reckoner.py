@@ -15,6 +15,7 @@ from groundstation.fusion.estimator import Counters, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
 from groundstation.fusion.packet_screen import PacketScreen
+from groundstation.fusion.table_map import TableMap
 
 Array = NDArray[np.float64]
 
@@ -26,25 +27,32 @@ BACKWARD_PACKETS = 20
 """Stamps in a row behind the newest one after which the clock, not the packets, is taken to have changed."""
 
 
+LOOKUP_EVERY = 8
+"""Packets between look-ups of the table's map; a vehicle moves millimetres meanwhile."""
+
+
 class Reckoner:
     """Carries the nominal state of the IMU point from packet to packet.
 
     Args:
         noise: limits of the screen, sensor lag, averaging window.
         counters: where oddities are counted.
+        table_map: the slope known beforehand; looked up every few packets.
     """
 
     __slots__ = (
         "_acc_lag", "_ax", "_ay", "_backward", "_backward_ns", "_bax", "_bay", "_bg", "_counters",
-        "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_mxx",
-        "_mxy", "_myx", "_myy", "_omega_read", "_period", "_px", "_py", "_reference_c", "_rx",
-        "_ry", "_screen", "_temperature_c", "_theta", "_vx", "_vy", "_warmth", "_x", "checkpoint_s",
-        "has_pose", "history", "is_lost", "newest_ns", "newest_s", "omega_rad_s", "origin_ns",
-        "rest_from_s", "rest_to_s", "variance",
+        "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
+        "_mxx", "_mxy", "_myx", "_myy", "_omega_read", "_period", "_px", "_py", "_reference_c",
+        "_rx", "_ry", "_screen", "_temperature_c", "_theta", "_until_lookup", "_vx", "_vy",
+        "_warmth", "_x", "checkpoint_s", "has_pose", "history", "is_lost", "newest_ns", "newest_s",
+        "omega_rad_s", "origin_ns", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
-    def __init__(self, noise: NoiseModel, counters: Counters) -> None:
+    def __init__(self, noise: NoiseModel, counters: Counters, table_map: TableMap | None = None) -> None:
         self._counters = counters
+        self._map = table_map
+        self._until_lookup = 0
         self._screen = PacketScreen(noise)
         self._period = noise.packet_period_s
         self._gyro_lag, self._acc_lag = noise.gyro_lag_s, noise.acc_lag_s
@@ -116,6 +124,11 @@ class Reckoner:
             )
         self._omega_read, self._ax, self._ay = omega, ax, ay
         self._advance(t, dt, omega, ax, ay, hole)
+        if self._map is not None:
+            self._until_lookup -= 1
+            if self._until_lookup < 0:
+                self._until_lookup = LOOKUP_EVERY
+                self._unpack()
         return True
 
     def _clock_restarted(self, t_ns: int) -> bool:
@@ -189,7 +202,7 @@ class Reckoner:
         """Take over a corrected state.
 
         Args:
-            x: (22,) biases, slope, scale and lever arm are taken from it.
+            x: (23,) biases, slope, scale and lever arm are taken from it.
             moved: (5,) theta, vx, vy, px, py now.
         """
         self._x = x.tolist()
@@ -217,4 +230,8 @@ class Reckoner:
         self._myx, self._myy = x[es.ACC_MATRIX + 2], 1.0 - x[es.ACC_MATRIX + 3]
         self._gx = x[es.SLOPE_X] + x[es.WAVE_X]
         self._gy = x[es.SLOPE_Y] + x[es.WAVE_Y]
+        if self._map is not None:
+            known_x, known_y = self._map.at(self._px, self._py)
+            self._gx += known_x
+            self._gy += known_y
         self._rx, self._ry = x[es.LEVER_X], x[es.LEVER_Y]

@@ -21,6 +21,7 @@ from groundstation.fusion import measurements
 from groundstation.fusion.flight import fly
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
+from groundstation.fusion.table_map import TableMap
 from groundstation.fusion.trace import Carried, Chain, Trace
 
 Array = NDArray[np.float64]
@@ -32,9 +33,9 @@ class Node:
 
     t_s: float
     x: Array
-    """(22,)."""
+    """(23,)."""
     P: Array
-    """(22, 22)."""
+    """(23, 23)."""
     is_rest: bool
     """Whether the step that ends here was one of rest."""
 
@@ -75,13 +76,16 @@ def _node(t_s: float, x: Array, P: Array, lam: Array, Lam: Array, *, is_rest: bo
     return Node(t_s, x - P @ lam, 0.5 * (smoothed + smoothed.T), is_rest)
 
 
-def smooth(trace: Trace, history: PacketHistory, noise: NoiseModel) -> Smoothed:
+def smooth(
+    trace: Trace, history: PacketHistory, noise: NoiseModel, table_map: TableMap | None = None
+) -> Smoothed:
     """Smooth a finished run of the filter.
 
     Args:
         trace: what the filter wrote down.
         history: all packets of the run, as the filter kept them.
         noise: the filter's model.
+        table_map: the filter's map.
     """
     t = np.array(history.rows[::7])
     state = np.full((len(t), 9), math.nan)
@@ -99,13 +103,15 @@ def smooth(trace: Trace, history: PacketHistory, noise: NoiseModel) -> Smoothed:
             if rows.stop > rows.start:
                 segment = history.between(before.t_s, after.t_s)
                 whole = rows.stop - rows.start  # the packet that the step's end cuts belongs to the next
-                moved, sigma = _between(before, after, segment, noise)
+                moved, sigma = _between(before, after, segment, noise, table_map)
                 state[rows], std[rows] = moved[:whole], sigma[:whole]
         all_nodes += nodes
     return Smoothed(t, state, std, all_nodes)
 
 
-def _between(before: Node, after: Node, segment: Segment, noise: NoiseModel) -> tuple[Array, Array]:
+def _between(
+    before: Node, after: Node, segment: Segment, noise: NoiseModel, table_map: TableMap | None
+) -> tuple[Array, Array]:
     """Return states (n, 9) and sigmas (n, 3) at the ends of the packets of one step."""
     x = before.x
     n = len(segment.span_s)
@@ -121,6 +127,9 @@ def _between(before: Node, after: Node, segment: Segment, noise: NoiseModel) -> 
         theta = x[es.THETA] + np.cumsum(omega * dt)
         pull = x[es.SLOPE_X : es.SLOPE_Y + 1] + x[es.WAVE_X : es.WAVE_Y + 1]
         a = flight.force_table + pull[:, None]
+        if table_map is not None:
+            began = np.cumsum(dt) - 0.5 * dt
+            a = a + table_map.along(x[es.PX] + x[es.VX] * began, x[es.PY] + x[es.VY] * began)
         push = a * dt
         v = x[es.VX : es.VY + 1, None] + np.cumsum(push, axis=1)
         p = x[es.PX : es.PY + 1, None] + np.cumsum((v - 0.5 * push) * dt, axis=1)
@@ -139,6 +148,8 @@ def _between(before: Node, after: Node, segment: Segment, noise: NoiseModel) -> 
     rx, ry = after.x[es.LEVER_X], after.x[es.LEVER_Y]
     lx, ly = c * rx - s * ry, s * rx + c * ry
     g = after.x[es.SLOPE_X : es.SLOPE_Y + 1] + after.x[es.WAVE_X : es.WAVE_Y + 1]
+    if table_map is not None:
+        g = g + np.array(table_map.at(float(after.x[es.PX]), float(after.x[es.PY])))
     warmth = segment.warmth_k
     bias = [
         after.x[es.GYRO_BIAS] + after.x[es.GYRO_TEMPCO] * warmth,

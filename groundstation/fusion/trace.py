@@ -16,11 +16,11 @@ class Carried:
 
     stop_s: float
     F: Array
-    """(22, 22)."""
+    """(23, 23)."""
     x: Array
-    """(22,) after the step."""
+    """(23,) after the step."""
     P: Array
-    """(22, 22) after the step."""
+    """(23, 23) after the step."""
     is_rest: bool
 
 
@@ -29,9 +29,9 @@ class Corrected:
     """The state was corrected by a measurement."""
 
     H: Array
-    """(m, 22)."""
+    """(m, 23)."""
     K: Array
-    """(22, m) gain."""
+    """(23, m) gain."""
     weight: Array
     """(m, m) inverse of the innovation's covariance."""
     z: Array
