@@ -35,6 +35,7 @@ ENTRY = np.dtype(
     ]
 )
 NO_NODE = 0xFFFF
+_LONGEST_NS = 0xFFFFFFFF
 
 
 class JournalWriter:
@@ -71,9 +72,9 @@ class JournalWriter:
         names = self._names
         node_index = NO_NODE if node is None else names.setdefault(node, len(names))
         owner_index = names.setdefault(owner, len(names))
-        self._rows.append(
-            (now_ns, sequence, int(kind), topic, node_index, owner_index, 0, min(wall_ns, 0xFFFFFFFF))
-        )
+        if wall_ns > _LONGEST_NS:
+            wall_ns = _LONGEST_NS
+        self._rows.append((now_ns, sequence, kind, topic, node_index, owner_index, 0, wall_ns))
 
     def take(self) -> tuple[tuple[str, ...], bytes]:
         """Names and packed entries since the last call."""

@@ -11,6 +11,15 @@ from groundstation.messages.base import Message
 from groundstation.nodes.node import Node
 
 
+@dataclass(slots=True)
+class Stream:
+    """What one process publishes on one topic of one owner, and the number of the last message."""
+
+    topic: Topic
+    owner: str
+    last: int
+
+
 class Sequences:
     """Sequence numbers of everything one process publishes, per topic and owner.
 
@@ -20,14 +29,17 @@ class Sequences:
 
     def __init__(self, after: int = 0) -> None:
         self._after = after
-        self._last: dict[tuple[int, str], int] = {}
+        self._streams: dict[tuple[int, str], Stream] = {}
+
+    def stream(self, topic: Topic, owner: str) -> Stream:
+        """The stream of a topic of an owner, shared by all who publish on it."""
+        return self._streams.setdefault((topic.index, owner), Stream(topic, owner, self._after))
 
     def next(self, topic: Topic, owner: str) -> int:
         """The next number."""
-        key = (topic.index, owner)
-        number = self._last.get(key, self._after) + 1
-        self._last[key] = number
-        return number
+        stream = self.stream(topic, owner)
+        stream.last += 1
+        return stream.last
 
 
 def owner_of(topic: Topic, payload: Message, process: str) -> str:
@@ -73,10 +85,7 @@ class NodeSlot:
     timing: Timing = field(default_factory=Timing)
     busy_until_ns: int = 0
     _newest: dict[int, int] = field(default_factory=dict)
-    _outputs: frozenset[type[Message]] = frozenset()
-
-    def __post_init__(self) -> None:
-        self._outputs = frozenset(self.node.outputs)
+    _streams: dict[tuple[type[Message], str], Stream] = field(default_factory=dict)
 
     def start(self, now_ns: int) -> list[Delivered]:
         """Journal the start and collect what the node says first."""
@@ -122,16 +131,23 @@ class NodeSlot:
         causes = self._causes(trigger)
         out = []
         for payload in payloads:
-            kind = type(payload)
-            if kind not in self._outputs:
-                raise TypeError(f"{self.key} said {kind.__name__}, which is not among its outputs")
-            topic = topic_of(kind)
-            owner = owner_of(topic, payload, self.process)
-            sequence = self.sequences.next(topic, owner)
+            stream = self._streams.get((type(payload), payload.vehicle)) or self._open(payload)
+            stream.last += 1
+            topic, owner, sequence = stream.topic, stream.owner, stream.last
             self.journal.note(Kind.OUTPUT, self.key, topic.index, owner, sequence, now_ns, wall_ns)
             envelope = Envelope(topic, owner, sequence, publish_ns, wall_ns, cpu_ns, causes)
             out.append(Delivered(envelope, payload))
         return out
+
+    def _open(self, payload: Message) -> Stream:
+        """Look up once where a kind of payload goes."""
+        kind = type(payload)
+        if kind not in self.node.outputs:
+            raise TypeError(f"{self.key} said {kind.__name__}, which is not among its outputs")
+        topic = topic_of(kind)
+        stream = self.sequences.stream(topic, owner_of(topic, payload, self.process))
+        self._streams[kind, payload.vehicle] = stream
+        return stream
 
     def _causes(self, trigger: Cause | None) -> tuple[Cause, ...]:
         newest = tuple(
