@@ -10,7 +10,7 @@ import pytest
 
 import groundstation.frames
 from groundstation.runtime.plan import processes_of
-from groundstation.runtime.rig import load_rig
+from groundstation.runtime.rig import load_rig, parse_rig
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -107,3 +107,23 @@ def test_the_page_of_benchmarks_keeps_its_marks():
 )
 def test_every_rig_of_the_examples_makes_a_plan_of_processes(path):
     assert processes_of(load_rig(path))[0] == "commands"
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/how_to/real_hardware.md"])
+def test_the_changes_for_real_hardware_make_a_rig_without_laboratory(page):
+    """What the page takes away stands in the rig of the emulator; what it adds makes a rig that loads."""
+    path = ROOT / "examples" / "rigs" / "two_mock_ups.toml"
+    changes = re.search(r"```diff\n(.*?)```", (ROOT / page).read_text(), flags=re.DOTALL)[1].splitlines()
+    taken = [line[1:] for line in changes if line.startswith("-") and "..." not in line]
+    added = [line[1:] for line in changes if line.startswith("+")]
+    wired, emulated, _ = path.read_text().partition("[laboratory]\n")
+    for line in taken:
+        assert line in wired + emulated, line
+        wired = wired.replace(f"{line}\n", "")
+    before, beta, _ = wired.partition("[vehicles.beta]")
+    assert beta
+    bus, *devices = added
+    rig = parse_rig(f"{bus}\n{before}" + "\n".join(devices), path)
+    assert rig.laboratory is None
+    assert rig.valve_bus["interface"] == "socketcan"
+    assert rig.vehicles["alpha"].imu.startswith("/dev/")
