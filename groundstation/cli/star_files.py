@@ -4,12 +4,14 @@ import csv
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
 
 from calibration.camera import CameraCalibration
 from groundstation.cli.errors import UsageError
@@ -34,8 +36,8 @@ def find_frames(folder: Path, sub_folder: str = "frames") -> list[Path]:
     return found
 
 
-def read_frame(path: Path, camera: CameraCalibration) -> NDArray[np.uint8]:
-    """Read one grey 8-bit picture of the camera's size.
+def read_frame(path: Path, camera: CameraCalibration | None) -> NDArray[np.uint8]:
+    """Read one grey 8-bit picture of the camera's size; of any size without a camera.
 
     Raises:
         UsageError: The file is empty, torn, no picture, in colour, not 8 bit, or of another size.
@@ -56,12 +58,20 @@ def read_frame(path: Path, camera: CameraCalibration) -> NDArray[np.uint8]:
         raise UsageError(f"{path}: has {image.shape[2]} colour channels, expected a grey picture.")
     if image.dtype != np.uint8:
         raise UsageError(f"{path}: has {8 * image.dtype.itemsize}-bit pixels, expected 8 bit.")
-    if image.shape != (camera.height, camera.width):
+    if camera is not None and image.shape != (camera.height, camera.width):
         raise UsageError(
             f"{path}: is {image.shape[1]} x {image.shape[0]} px, camera.json says "
             f"{camera.width} x {camera.height}."
         )
     return np.asarray(image, dtype=np.uint8)
+
+
+def with_progress(frames: list[Path], what: str) -> Iterator[Path]:
+    """Iterate with a progress bar on a terminal's stderr, silently elsewhere."""
+    console = Console(stderr=True)
+    yield from track(
+        frames, description=what, console=console, disable=not console.is_terminal, transient=True
+    )
 
 
 def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:

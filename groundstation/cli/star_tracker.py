@@ -5,7 +5,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,13 +14,18 @@ import cv2
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.progress import track
 
 from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
+from groundstation.cli import star_calibration
 from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import find_frames, read_anchors, read_frame, write_atomically
-from groundstation.cli.star_plots import plot_adjustment
+from groundstation.cli.star_files import (
+    find_frames,
+    read_anchors,
+    read_frame,
+    with_progress,
+    write_atomically,
+)
+from groundstation.cli.star_plots import plot_residuals
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.published import PublishedTracker
@@ -45,6 +50,12 @@ COLUMNS = (
     "std_heading_rad",
     "reason",
 )
+
+
+app.command()(star_calibration.intrinsics)
+app.command()(star_calibration.board)
+app.command()(star_calibration.mount)
+app.command()(star_calibration.delay)
 
 
 class Method(StrEnum):
@@ -78,7 +89,7 @@ def solve(
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for path in _with_progress(frames, "solving"):
+    for path in with_progress(frames, "solving"):
         image = read_frame(path, camera)
         begin = time.process_time()
         answer = solver(image)
@@ -115,7 +126,7 @@ def survey(
         raise UsageError(str(error)) from error
     frames = find_frames(folder)
     anchors = read_anchors(folder / "anchors.csv", [path.stem for path in frames])
-    pictures = [detect(read_frame(path, camera)) for path in _with_progress(frames, "finding stars")]
+    pictures = [detect(read_frame(path, camera)) for path in with_progress(frames, "finding stars")]
     try:
         if verify_every > 1:
             kept_anyway = {anchor.frame for anchor in anchors}
@@ -133,7 +144,8 @@ def survey(
     if camera_out is not None:
         write_atomically(camera_out, json.dumps(sky.camera.to_mapping(), indent=1) + "\n")
     if plot is not None:
-        plot_adjustment(plot, sky.adjusted, f"Survey of {len(sky.ids)} stars from {len(sky.placed)} pictures")
+        residual = sky.adjusted.residual_px[sky.adjusted.used]
+        plot_residuals(plot, residual, f"Survey of {len(sky.ids)} stars from {len(sky.placed)} pictures")
     tape_mm = 1e3 * float(np.sqrt((sky.tape_residual_m**2).sum(axis=1).mean()))
     print(
         f"{len(sky.ids)} stars from {len(sky.placed)} of {len(frames)} pictures, "
@@ -205,11 +217,3 @@ def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
         *(f"{value:.3e}" for value in spread),
         "",
     ]
-
-
-def _with_progress(frames: list[Path], what: str) -> Iterator[Path]:
-    """Iterate with a progress bar on a terminal's stderr, silently elsewhere."""
-    console = Console(stderr=True)
-    yield from track(
-        frames, description=what, console=console, disable=not console.is_terminal, transient=True
-    )

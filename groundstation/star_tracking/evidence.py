@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 STRAY_RATIO = 0.5
 SIGMAS_PX = (0.06, 0.2, 0.7)
+"""Errors of a calibrated camera under a surveyed sky: from a bright star to a blurred one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +29,13 @@ class Chance:
         density_m2: Stars per area of ceiling.
         pose_volume_m2_rad: Prior volume of poses: area times 2 pi, or that of a Gaussian prior.
         scale_m_px: Length of one pixel on the ceiling.
+        sigmas_px: Sigmas to average over.
     """
 
     density_m2: float
     pose_volume_m2_rad: float
     scale_m_px: float
+    sigmas_px: tuple[float, ...] = SIGMAS_PX
 
 
 def evidence_nats(distance_m: NDArray[np.float64], lever_m: float, spots: int, chance: Chance) -> float:
@@ -47,7 +50,7 @@ def evidence_nats(distance_m: NDArray[np.float64], lever_m: float, spots: int, c
     n = len(distance_m)
     unmatched = (spots - n) * math.log(STRAY_RATIO)
     terms = []
-    for sigma_px in SIGMAS_PX:
+    for sigma_px in chance.sigmas_px:
         sigma = sigma_px * chance.scale_m_px
         seen = np.exp(-0.5 * (distance_m / sigma) ** 2) / (2.0 * math.pi * sigma * sigma)
         matched = float(np.log(STRAY_RATIO + (1.0 - STRAY_RATIO) / chance.density_m2 * seen).sum())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.evidence import Chance, evidence_nats
+from groundstation.star_tracking.evidence import SIGMAS_PX, Chance, evidence_nats
 from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, Refusal, StarFix
 from groundstation.star_tracking.hypotheses import (
     NEIGHBOUR_RANKS,
@@ -48,6 +48,7 @@ class TrackerSettings:
         tolerance_px: How far a triangle's lengths may be off, as pixels near the axis.
         centre_floor_px: Error of a centre that no fit knows of (PSF, survey), one sigma per axis.
         evidence_nats: Log likelihood over chance that a fix must have: e^-t bounds the false ones.
+        evidence_sigmas_px: Errors of spots that the likelihood is averaged over.
         min_stars: Stars of a fix without a prior.
         min_stars_prior: Stars of a fix with a prior.
         identified_spots: The brightest so many spots take part in the search.
@@ -61,6 +62,7 @@ class TrackerSettings:
     tolerance_px: float = 1.4
     centre_floor_px: float = 0.012
     evidence_nats: float = 9.0
+    evidence_sigmas_px: tuple[float, ...] = SIGMAS_PX
     min_stars: int = 4
     min_stars_prior: int = 3
     identified_spots: int = 60
@@ -298,7 +300,10 @@ class StarTracker:
             volume = gaussian * math.exp(min(surprise, 200.0))
         lever = float(np.sqrt((np.abs(q - q.mean()) ** 2).sum()))
         return evidence_nats(
-            distance, lever, spots, Chance(self.sky.density_m2, volume, self.rays.scale_m_px)
+            distance,
+            lever,
+            spots,
+            Chance(self.sky.density_m2, volume, self.rays.scale_m_px, self.settings.evidence_sigmas_px),
         )
 
     def _refusal(self, spots: Spots, search: _Search) -> NoFix:
