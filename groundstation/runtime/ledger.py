@@ -28,17 +28,19 @@ _WINDOW = 2000
 _STATE = topic_of(m.VehicleState).index
 _IMU = topic_of(m.Imu).index
 _IMU_BYTES = topic_of(m.ImuBytes).index
-HEARD: tuple[type[Message], ...] = (
-    m.ImuBytes,
-    m.Imu,
-    m.StarSpots,
-    m.StarFix,
-    m.VehicleState,
-    m.Wrench,
-    m.ValveDemand,
-    m.ValveSelection,
-    m.ValveCommand,
-    m.CanOut,
+HEARD: frozenset[type[Message]] = frozenset(
+    {
+        m.ImuBytes,
+        m.Imu,
+        m.StarSpots,
+        m.StarFix,
+        m.VehicleState,
+        m.Wrench,
+        m.ValveDemand,
+        m.ValveSelection,
+        m.ValveCommand,
+        m.CanOut,
+    }
 )
 
 

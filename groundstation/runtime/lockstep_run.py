@@ -14,8 +14,8 @@ from groundstation.messages.definitions import Latency
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
 from groundstation.runtime.errors import RigError, UsageError
+from groundstation.runtime.ledger import HEARD, Ledger
 from groundstation.runtime.lockstep import LockstepRunner, Observer
-from groundstation.runtime.monitor import Monitor
 from groundstation.runtime.node_table import build_slots
 from groundstation.runtime.plan import laboratory_ports
 from groundstation.runtime.provenance import recording_info
@@ -64,21 +64,23 @@ def seed_of(rig: Rig, seed: int | None) -> int:
 class _LatencyReporter:
     """Says the ledger's summaries once a second of virtual time."""
 
-    def __init__(self, monitor: Monitor, recorder: Recorder) -> None:
-        self._monitor = monitor
+    def __init__(self, vehicles: tuple[str, ...], recorder: Recorder) -> None:
+        self._vehicles = vehicles
+        self._ledger = Ledger()
         self._recorder = recorder
         self._due_ns = LATENCY_PERIOD_NS
         self._sequence = 0
 
     def __call__(self, delivered: Delivered, now_ns: int) -> None:
-        self._monitor.take(delivered, now_ns)
+        if type(delivered.payload) in HEARD:
+            self._ledger.take(delivered)
         if now_ns < self._due_ns:
             return
         self._due_ns += LATENCY_PERIOD_NS
         self._sequence += 1
         topic = topic_of(Latency)
-        for vehicle in self._monitor.vehicles:
-            summary = self._monitor.ledger.summary(vehicle, now_ns)
+        for vehicle in self._vehicles:
+            summary = self._ledger.summary(vehicle, now_ns)
             envelope = Envelope(topic, vehicle, self._sequence, now_ns)
             self._recorder.record(Delivered(envelope, summary), now_ns)
 
@@ -93,13 +95,12 @@ def run_lockstep(
     """
     seed = seed_of(rig, seed)
     info = recording_info(rig, rig_path, seed, utc_offset_ns=None)
-    monitor = Monitor(tuple(rig.vehicles))
     try:
         recorder = Recorder(recording, info)
     except RecordingError as error:
         raise UsageError(str(error)) from error
     try:
-        runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(monitor, recorder)])
+        runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(tuple(rig.vehicles), recorder)])
     except BaseException:
         recorder.discard()
         raise
