@@ -182,7 +182,7 @@ class Launcher:
 
     def _start(self, child: Child) -> None:
         module = "recorder" if child.name == RECORDER else "process"
-        child.start(["-m", f"groundstation.runtime.{module}"])
+        child.start(["-m", f"groundstation.runtime.{module}", child.name])  # the name is for `ps`
         if self._addresses is not None or child.name == RECORDER:
             self._tell(child)
 

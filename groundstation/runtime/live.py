@@ -365,6 +365,8 @@ class LiveProcess:
             self._publish(slot.stop(time.monotonic_ns()))
             self._drain()
         for thread in self._threads:
+            thread.ask_to_end()
+        for thread in self._threads:
             thread.close()
         self._publish_journal(time.monotonic_ns())
 

@@ -44,6 +44,10 @@ class Edge(ABC):
         """Send something out. Raises DeviceError."""
         raise TypeError(f"{type(self).__name__} is read-only, cannot send {data!r}")
 
+    def wake(self) -> None:
+        """Make a waiting ``read`` in another thread return; by itself it does within ``READ_TIMEOUT_S``."""
+        return
+
     @abstractmethod
     def close(self) -> None:
         """Release the device; may be called twice."""
@@ -60,6 +64,9 @@ class _ByteEdge(Edge):
     def write(self, data: bytes | CanFrame) -> None:
         assert isinstance(data, bytes)
         self._port.write(data)
+
+    def wake(self) -> None:
+        self._port.wake()
 
     def close(self) -> None:
         self._port.close()
@@ -174,9 +181,16 @@ class PortThread(threading.Thread):
         except DeviceError as error:
             self._trouble(self.port.channel, WARNING, f"{self.port.channel}: {error}")
 
+    def ask_to_end(self) -> None:
+        """Let the thread end soon."""
+        self._closing.set()
+        edge = self._edge
+        if edge is not None:
+            edge.wake()
+
     def close(self) -> None:
         """End the thread and release the device."""
-        self._closing.set()
+        self.ask_to_end()
         if self.is_alive():
             self.join(timeout=1.0)
         self._release()

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from calibration.camera.errors import CalibrationFileError
 from drivers.errors import DeviceError
@@ -66,21 +66,21 @@ def read_orders() -> Orders | None:
     return Orders(**json.loads(line)) if line else None
 
 
-def obey(run: Callable[[Orders], None]) -> int:
-    """Read the orders and carry them out; return the exit code.
+def obey(run: Callable[[Orders], None]) -> NoReturn:
+    """Read the orders, carry them out and end the process.
 
     What the orders name and cannot be used is said in one sentence on stderr.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    orders = read_orders()
-    if orders is None:
-        return 0
-    try:
-        run(orders)
-    except (UsageError, CalibrationFileError, DeviceError) as error:
-        sys.stderr.write(" ".join(str(error).split()) + "\n")
-        return REFUSAL
-    return 0
+    orders, code = read_orders(), 0
+    if orders is not None:
+        try:
+            run(orders)
+        except (UsageError, CalibrationFileError, DeviceError) as error:
+            sys.stderr.write(" ".join(str(error).split()) + "\n")
+            code = REFUSAL
+    sys.stderr.flush()
+    os._exit(code)  # all is closed; taking the interpreter apart would cost what the end of a run has not
 
 
 def stop_when_asked(stop: Callable[[], None]) -> None:
@@ -122,4 +122,4 @@ def run(orders: Orders) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(obey(run))
+    obey(run)

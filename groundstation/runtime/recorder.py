@@ -85,4 +85,4 @@ def _record(recorder: Recorder, bus: ZenohBus, orders: Orders) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(obey(run))
+    obey(run)

@@ -1,0 +1,121 @@
+"""Every process may die or hang: valves close, the others fly on, it comes back and flies again."""
+
+import itertools
+import os
+import signal
+
+import pytest
+
+from groundstation.bus.topics import topic_of
+from groundstation.cli.replay import _factory
+from groundstation.messages.definitions import SequencePhase, ValveStatus, VehicleState
+from groundstation.recording.reader import Recording
+from groundstation.recording.recover import recover
+from groundstation.runtime.replay import ReplayRunner
+from groundstation.runtime.rig import parse_rig
+
+pytestmark = pytest.mark.slow
+
+
+def fly_and(launch, rig, name, number):
+    """Fly, send a signal to a process, wait for its return; the run and its new process number."""
+    run = launch(rig)
+    run.wait_until_flying()
+    run.wait_for("alpha", "flying", "open")
+    run.forget()
+    old = run.pids()[name]
+    os.kill(old, number)
+    return run, old
+
+
+def of(path, kind, vehicle):
+    with Recording(path) as recording:
+        return [row.payload for row in recording.delivered([topic_of(kind)], [vehicle])]
+
+
+def longest_silence_s(payloads):
+    stamps = [payload.stamp_ns for payload in payloads]
+    return max(b - a for a, b in itertools.pairwise(stamps)) * 1e-9
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_without_commands_the_valve_node_closes_and_the_start_sequence_arms_again(launch, two_drawn, number):
+    run, _ = fly_and(launch, two_drawn, "commands", number)
+    run.wait_for("commands was ended by SIGKILL; starting it again")
+    run.wait_for("alpha: arming")
+    run.wait_for("alpha: flying")
+    run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    for vehicle in ("alpha", "beta"):
+        phases = [row.phase for row in of(run.recording, SequencePhase, vehicle)]
+        assert phases[-2:] == ["arming", "flying"]
+        assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0  # its loop went on
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_one_vehicles_loop_dies_the_other_flies_on_and_it_flies_again(launch, two_drawn, number):
+    run, _ = fly_and(launch, two_drawn, "alpha_flight", number)
+    run.wait_for("alpha_flight was ended by SIGKILL; starting it again")
+    run.wait_for("alpha/imu: open")
+    for _ in range(4):
+        run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    assert longest_silence_s(of(run.recording, VehicleState, "alpha")) > 0.5
+    assert of(run.recording, VehicleState, "alpha")[-1].status == "flying"
+    assert longest_silence_s(of(run.recording, VehicleState, "beta")) < 1.0
+    assert not any(status.dead_man for status in of(run.recording, ValveStatus, "beta")[200:])
+
+
+def test_the_station_may_die_without_touching_the_flight(launch, two_drawn):
+    run, _ = fly_and(launch, two_drawn, "station", signal.SIGKILL)
+    run.wait_for("station was ended by SIGKILL; starting it again")
+    run.wait_for("alpha: flying")
+    assert run.end()[0] == 0
+    for vehicle in ("alpha", "beta"):
+        assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0
+        assert not any(status.dead_man for status in of(run.recording, ValveStatus, vehicle)[200:])
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_dead_recorder_loses_nothing_that_was_written_and_goes_on_in_another_file(
+    launch, two_drawn, number
+):
+    run, _ = fly_and(launch, two_drawn, "recorder", number)
+    run.wait_for("recorder was ended by SIGKILL; starting it again")
+    for _ in range(3):
+        run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    second = run.recording.with_stem("run_1")
+    assert longest_silence_s(of(second, VehicleState, "alpha")) < 1.0
+    whole = run.folder / "whole.mcap"
+    recover(run.recording.with_name("run.mcap.part"), whole)
+    assert len(of(whole, VehicleState, "alpha")) > 50
+    assert any("not finished" in line for line in run.lines)
+
+
+def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):
+    run, old = fly_and(launch, two_drawn, "laboratory", signal.SIGKILL)
+    run.wait_for("the laboratory was ended by SIGKILL: starting it again")
+    run.wait_for("rest calibration")
+    run.wait_until_flying()
+    assert run.pids()["laboratory"] != old
+    assert run.end()[0] == 0
+
+
+def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
+    run, _ = fly_and(launch, two_drawn, "alpha_flight", signal.SIGKILL)
+    run.wait_for("alpha/imu: open")
+    for _ in range(3):
+        run.wait_for("alpha", "flying", "open")
+    assert run.request("alpha", "go_to", "-0.5", "-0.1", "10").returncode == 0
+    refused = run.request("alpha", "go_to", "5", "0", "0")
+    assert refused.returncode == 1
+    assert "outside the part of the table" in refused.stdout
+    run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    with Recording(run.recording) as recording:
+        rig = parse_rig(recording.info.rig_toml, two_drawn)
+        report = ReplayRunner(recording, _factory(rig)).run()
+    assert [(row.noun, row.owner, str(row.first)) for row in report.results if not row.agrees] == []
+    assert not report.missing_inputs
+    assert not report.refused
