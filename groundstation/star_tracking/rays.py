@@ -9,6 +9,7 @@ to 5e-4 px for any lens whose distortion a webcam could have.
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,8 +83,23 @@ def ceiling_points(
     return q, jacobian
 
 
+class Lens(Protocol):
+    """What distortion needs of a camera: focal lengths and centre in px, k1, k2, p1, p2, k3."""
+
+    @property
+    def fx(self) -> float: ...
+    @property
+    def fy(self) -> float: ...
+    @property
+    def cx(self) -> float: ...
+    @property
+    def cy(self) -> float: ...
+    @property
+    def distortion(self) -> tuple[float, float, float, float, float]: ...
+
+
 def undistort(
-    camera: CameraCalibration, u_px: NDArray[np.float64], v_px: NDArray[np.float64]
+    camera: Lens, u_px: NDArray[np.float64], v_px: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Invert OpenCV's distortion by Newton's method.
 
@@ -106,7 +122,7 @@ def undistort(
 
 
 def distort(
-    camera: CameraCalibration, x: NDArray[np.float64], y: NDArray[np.float64]
+    camera: Lens, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Apply k1, k2, p1, p2, k3 to normalised coordinates; give the derivatives (n, 2, 2) too."""
     k1, k2, p1, p2, k3 = camera.distortion
