@@ -14,6 +14,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+PACKAGE = "air_table_msgs"
+"""ROS 2 package of our own message types."""
+
 Bool = Annotated[bool, "bool"]
 U8 = Annotated[int, "uint8"]
 U16 = Annotated[int, "uint16"]

@@ -1,0 +1,98 @@
+"""What fusion believes, and what the reference system says."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from groundstation.messages.base import (
+    F64,
+    I64,
+    PACKAGE,
+    U32,
+    Bool,
+    Bytes,
+    Float64x2,
+    Float64x3,
+    Message,
+    Text,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VehicleState(Message):
+    """State of the centre of mass at the end of an IMU window.
+
+    Attributes:
+        position_table_m: x, y.
+        heading_rad: In [-pi, pi).
+        velocity_table_m_s: x, y.
+        rate_rad_s: Bias-corrected turn rate.
+        pose_std: Standard deviations of x, y (m) and heading (rad).
+        status: ``starting``, ``resting``, ``flying`` or ``lost``.
+        fix_stamp_ns: Exposure of the newest fix inside, 0 before the first.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleState"
+    position_table_m: Float64x2
+    heading_rad: F64
+    velocity_table_m_s: Float64x2
+    rate_rad_s: F64
+    pose_std: Float64x3
+    status: Text
+    fix_stamp_ns: I64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FixAccount(Message):
+    """What fusion did with one fix; the stamp is the fix's exposure."""
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixAccount"
+    used: Bool
+    reason: Text
+    innovation: Float64x3
+    nis: F64
+    age_s: F64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusionStatus(Message):
+    """How the estimator is doing, a few times a second.
+
+    Attributes:
+        status: As in ``VehicleState``.
+        method: Row of the table of estimators.
+        bias_rate_rad_s: What is subtracted from the gyro.
+        bias_force_m_s2: What is subtracted from the accelerometers (body).
+        rest_s: Length of the rest used so far for zero offsets.
+        fixes_used: Since start.
+        fixes_refused: Since start.
+        fix_age_s: Since the exposure of the newest used fix, infinity before the first.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FusionStatus"
+    status: Text
+    method: Text
+    bias_rate_rad_s: F64
+    bias_force_m_s2: Float64x2
+    rest_s: F64
+    fixes_used: U32
+    fixes_refused: U32
+    fix_age_s: F64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceBytes(Message):
+    """A read of the reference stream (truth of the emulator, or motion capture)."""
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ReferenceBytes"
+    data: Bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceState(Message):
+    """Pose and velocity by the reference system; for view, recorder and report only."""
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ReferenceState"
+    position_table_m: Float64x2
+    heading_rad: F64
+    velocity_table_m_s: Float64x2
+    rate_rad_s: F64
