@@ -26,7 +26,7 @@ from groundstation.runtime.rig import load_rig
 app = typer.Typer(rich_markup_mode=None)
 
 REFRESH_S = 0.25
-LINE_EVERY_S = 1.0
+LINE_EVERY_S = 2.0
 
 
 @app.command()
@@ -118,8 +118,10 @@ def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
                     break
                 if not headless:
                     view.refresh()
-                elif now_s >= next_line_s:
-                    view.print_lines()
+                    continue
+                view.print_tidings()
+                if now_s >= next_line_s:
+                    view.print_vehicles()
                     next_line_s = now_s + LINE_EVERY_S
     finally:
         live.close()

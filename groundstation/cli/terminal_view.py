@@ -1,22 +1,33 @@
-"""What ``groundstation run`` shows: mock-ups, errors against truth, rates, ledger, processes, tidings."""
+"""What ``groundstation run`` shows on a terminal: mock-ups, ages, processes, ports, tidings."""
 
 import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.columns import Columns
+from rich import box
 from rich.console import Console, Group
 from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from groundstation.cli.vehicle_rows import LABELS, line_of, rows_of
 from groundstation.messages import definitions as m
 from groundstation.runtime.live_run import LiveRun
-from groundstation.runtime.monitor import VehicleMonitor
 
-_GOOD, _BAD, _DIM = "green", "red", "dim"
+_GOOD, _BAD, _DIM, _WARN = "green", "red", "bright_black", "yellow"
+_STAGES = {
+    "arrival": "frame read",
+    "spots": "spots found",
+    "fix": "fix published",
+    "state": "in the state",
+    "wrench": "in the wrench",
+    "guard": "past the guard",
+    "bus": "on the valve bus",
+    "bytes_to_state": "IMU bytes to state",
+}
+_MOST_COLUMNS = 4  # of vehicles beside each other on 120 characters
 
 
 class TerminalView:
@@ -26,11 +37,11 @@ class TerminalView:
         self._run = live
         self._console = console
         self._live: Live | None = None
-        self._said = 0
+        self._waited_for = ""
 
     @contextmanager
     def opened(self, *, headless: bool) -> Iterator[None]:
-        """Keep the screen while the run lasts."""
+        """Keep the screen while the run lasts; the last picture stays."""
         if headless:
             yield
             return
@@ -45,109 +56,109 @@ class TerminalView:
         if self._live is not None:
             self._live.update(self._draw(), refresh=True)
 
-    def print_lines(self) -> None:
-        """New tidings, then one line per vehicle."""
-        monitor = self._run.monitor
-        elapsed = f"{time.monotonic() - self._run.started_s:7.1f} s"
-        for line in monitor.take_lines():
-            print(f"{elapsed}  {line}", flush=True)
-        for name, vehicle in monitor.vehicles.items():
-            print(f"{elapsed}  {name}: {_line(vehicle)}", flush=True)
+    def print_tidings(self) -> None:
+        """What happened since the last call, one line each."""
+        waiting = self._run.launcher.waiting_for
+        waited_for = f"starting: waiting for {', '.join(waiting)}" if waiting else "all processes are ready"
+        if waited_for != self._waited_for:
+            self._waited_for = waited_for
+            self._run.monitor.say(waited_for)
+        for line in self._run.monitor.take_lines():
+            print(f"{self._elapsed_s():7.1f} s  {line}", flush=True)
+
+    def print_vehicles(self) -> None:
+        """One line per vehicle that was heard of."""
+        vehicles = self._run.monitor.vehicles
+        width = max(map(len, vehicles))
+        now_ns = time.monotonic_ns()
+        for name, vehicle in vehicles.items():
+            if vehicle.newest:
+                print(f"{self._elapsed_s():7.1f} s  {name:<{width}} {line_of(vehicle, now_ns)}", flush=True)
+
+    def _elapsed_s(self) -> float:
+        return time.monotonic() - self._run.started_s
 
     def _draw(self) -> Group:
         run = self._run
-        elapsed = time.monotonic() - run.started_s
-        title = Text.assemble((run.rig.name, "bold"), f"   {elapsed:.0f} s   ", ("Ctrl-C ends", _DIM))
-        tidings = Text("\n".join(run.monitor.lines) or "starting ...")
+        minutes, seconds = divmod(int(self._elapsed_s()), 60)
+        waiting = run.launcher.waiting_for
+        status = (f"waiting for {', '.join(waiting)}", _WARN) if waiting else ("running", _GOOD)
+        title = Table.grid(expand=True)
+        title.add_column(no_wrap=True, overflow="ellipsis")
+        title.add_column(justify="right", no_wrap=True)
+        title.add_row(
+            Text.assemble((run.rig.name, "bold"), "  ", status),
+            Text(f"{minutes}:{seconds:02d}   Ctrl-C ends", style=_DIM),
+        )
+        lower = Table.grid(expand=True, padding=(0, 3))
+        lower.add_column()
+        lower.add_column()
+        lower.add_column(ratio=1)
+        lower.add_row(self._ages(), self._processes(), self._ports())
+        tidings = Text("\n".join(run.monitor.lines) or "starting ...", no_wrap=True, overflow="ellipsis")
         return Group(
             title,
-            self._vehicles(),
-            Columns([self._ledger(), self._processes()]),
-            Panel(tidings, title="tidings", title_align="left", border_style=_DIM),
+            *self._vehicles(),
+            lower,
+            Panel(tidings, title="tidings", title_align="left", border_style=_DIM, padding=(0, 1)),
         )
 
-    def _vehicles(self) -> Table:
-        table = Table(title="mock-ups", title_justify="left", expand=True)
-        headings = (
-            "", "phase", "valves", "position mm", "heading deg", "off goal mm, deg (rms 30 s)",
-            "estimate error mm, deg (rms)", "imu, fix, state Hz", "fix age s", "fixes used/refused",
-            "lost frames", "tank bar",
-        )  # fmt: skip
-        for heading in headings:
-            table.add_column(heading, justify="right" if heading else "left")
+    def _vehicles(self) -> Iterator[Table]:
         now_ns = time.monotonic_ns()
-        for name, vehicle in self._run.monitor.vehicles.items():
-            table.add_row(name, *_cells(vehicle, now_ns))
-        return table
+        every = list(self._run.monitor.vehicles.items())
+        for first in range(0, len(every), _MOST_COLUMNS):
+            shown = every[first : first + _MOST_COLUMNS]
+            table = Table(box=box.SIMPLE_HEAD, expand=True, padding=(0, 1), pad_edge=False)
+            table.add_column("", style=_DIM, no_wrap=True, width=24)
+            for name, _ in shown:
+                table.add_column(Text(name, style="bold"), no_wrap=True, ratio=1)
+            columns = [rows_of(vehicle, now_ns) for _, vehicle in shown]
+            for label, *cells in zip(LABELS, *columns, strict=True):
+                table.add_row(label, *cells)
+            yield table
 
-    def _ledger(self) -> Table:
-        table = Table(title="age of light, and bytes to state: p50 / p99 ms", title_justify="left")
-        table.add_column("")
+    def _ages(self) -> Table:
+        table = _small("age of the light, p50 / p99 ms")
+        table.add_column("", style=_DIM, no_wrap=True)
         rows = {name: vehicle.newest.get(m.Latency) for name, vehicle in self._run.monitor.vehicles.items()}
-        known = {name: row for name, row in rows.items() if isinstance(row, m.Latency)}
-        stages = next(iter(known.values())).stages if known else ()
-        for stage in stages:
-            table.add_column(stage.replace("_", " "), justify="right")
-        for name, row in known.items():
-            cells = [_ms(low, high) for low, high in zip(row.p50_s, row.p99_s, strict=True)]
-            table.add_row(name, *cells)
+        known = {name: row for name, row in list(rows.items())[:_MOST_COLUMNS] if isinstance(row, m.Latency)}
+        for name in known:
+            table.add_column(name, justify="right", no_wrap=True)
+        for index, label in enumerate(_STAGES.values()):
+            table.add_row(label, *(_ms(row.p50_s[index], row.p99_s[index]) for row in known.values()))
         return table
 
     def _processes(self) -> Table:
-        table = Table(title="processes", title_justify="left")
-        for heading in ("process", "state", "restarts"):
-            table.add_column(heading)
+        table = _small("processes")
+        for heading in ("", "", "again"):
+            table.add_column(heading, no_wrap=True)
         for child in self._run.launcher.children:
-            style = _GOOD if child.state == "ready" else _BAD
+            style = _GOOD if child.state == "ready" else _WARN
             table.add_row(child.name, Text(child.state, style=style), str(child.restarts or ""))
         return table
 
-
-def _cells(vehicle: VehicleMonitor, now_ns: int) -> list[str | Text]:
-    newest = vehicle.newest
-    phase, mode, state = newest.get(m.SequencePhase), newest.get(m.VehicleMode), newest.get(m.VehicleState)
-    command, fusion = newest.get(m.ValveCommand), newest.get(m.FusionStatus)
-    imu, valves = newest.get(m.Imu), newest.get(m.ValveStatus)
-    armed = isinstance(mode, m.VehicleMode) and mode.armed
-    gate = command.gate if isinstance(command, m.ValveCommand) else "no word"
-    cells: list[str | Text] = [
-        Text(phase.phase if isinstance(phase, m.SequencePhase) else "-"),
-        Text(f"{'armed' if armed else 'disarmed'}, {gate}", style=_GOOD if gate == "open" else _BAD),
-    ]
-    if isinstance(state, m.VehicleState):
-        x, y = state.position_table_m
-        cells += [f"{x * 1e3:8.1f} {y * 1e3:8.1f}", f"{math.degrees(state.heading_rad):7.2f}"]
-    else:
-        cells += ["-", "-"]
-    cells += [_pair(vehicle.station_errors.rms()), _pair(vehicle.estimate_errors.rms())]
-    rates = "  ".join(f"{vehicle.rate_hz(kind, now_ns):.0f}" for kind in (m.Imu, m.StarFix, m.VehicleState))
-    cells.append(rates)
-    if isinstance(fusion, m.FusionStatus):
-        cells += [f"{fusion.fix_age_s:.2f}", f"{fusion.fixes_used}/{fusion.fixes_refused}"]
-    else:
-        cells += ["-", "-"]
-    cells.append(str(imu.frames_lost) if isinstance(imu, m.Imu) else "-")
-    cells.append(f"{valves.pressure_pa * 1e-5:.0f}" if isinstance(valves, m.ValveStatus) else "-")
-    return cells
+    def _ports(self) -> Table:
+        table = _small("ports")
+        table.add_column("", no_wrap=True)
+        table.add_column("", no_wrap=True, overflow="ellipsis")
+        for name, said in sorted(self._run.monitor.ports.items()):
+            if said.level == 0:
+                table.add_row(name, Text("open", style=_GOOD))
+            else:
+                table.add_row(name, Text(said.summary.removeprefix(f"{name}: "), style=_BAD))
+        return table
 
 
-def _line(vehicle: VehicleMonitor) -> str:
-    """One line for a log."""
-    now_ns = time.monotonic_ns()
-    cells = [str(cell).strip() for cell in _cells(vehicle, now_ns)]
-    phase, gate, position, heading, off, estimate, rates, age, fixes, lost, tank = cells
-    return (
-        f"{phase}; valves {gate}; at {position} mm, {heading} deg; off goal {off} mm deg; "
-        f"estimate error {estimate} mm deg; imu, fix, state {rates} Hz; fix age {age} s; "
-        f"fixes used/refused {fixes}; lost frames {lost}; tank {tank} bar"
+def _small(title: str) -> Table:
+    return Table(
+        title=title,
+        box=None,
+        title_justify="left",
+        title_style="bold",
+        padding=(0, 2, 0, 0),
+        pad_edge=False,
+        header_style=_DIM,
     )
-
-
-def _pair(rms: tuple[float, float]) -> str:
-    position_m, heading_rad = rms
-    if math.isnan(position_m):
-        return "-"
-    return f"{position_m * 1e3:.2f}  {math.degrees(heading_rad):.3f}"
 
 
 def _ms(low_s: float, high_s: float) -> str:

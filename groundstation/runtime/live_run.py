@@ -70,6 +70,7 @@ class LiveRun:
             if now_s >= self._latency_due_s:
                 self._latency_due_s = now_s + LATENCY_PERIOD_S
                 self._publish_latency()
+                self.monitor.look(time.monotonic_ns())
 
     def close(self) -> None:
         """End everything in good order."""

@@ -79,7 +79,18 @@ class VehicleMonitor:
         return rate.hz(now_ns) if rate is not None else 0.0
 
 
-_RATED: tuple[type[Message], ...] = (m.Imu, m.StarFix, m.VehicleState, m.ValveCommand)
+_RATED: tuple[type[Message], ...] = (m.Imu, m.StarFix, m.VehicleState, m.ValveCommand, m.ValveStatus)
+_SOON_AGAIN = "; next try in "  # what differs from one failure of a port to its next
+SILENT_S = 3.0
+
+
+@dataclass(slots=True)
+class _Line:
+    """What the IMU reader counted on one serial line, and whether it was complained about."""
+
+    bytes_seen: int = 0
+    grows: bool = False
+    is_bad: bool = False
 
 
 class Monitor:
@@ -90,6 +101,8 @@ class Monitor:
         self.ledger = ledger.Ledger()
         self.ports: dict[str, m.Diagnostics] = {}
         self.nodes: dict[str, m.Diagnostics] = {}
+        self._lines_of: dict[str, _Line] = {}
+        self._silent_nodes: set[str] = set()
         self.lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._unread: list[str] = []
 
@@ -129,12 +142,56 @@ class Monitor:
         lines, self._unread = self._unread, []
         return lines
 
+    def look(self, now_ns: int) -> None:
+        """Say what is open and yet silent, or full of noise; call about once a second."""
+        for name, vehicle in self.vehicles.items():
+            port = self.ports.get(f"{name}/imu")
+            line = self._lines_of.setdefault(name, _Line())
+            is_bad = (
+                port is not None
+                and port.level == 0
+                and now_ns - port.stamp_ns > SILENT_S * 1e9
+                and vehicle.rate_hz(m.Imu, now_ns) == 0.0
+            )
+            if is_bad and not line.is_bad:
+                what = (
+                    "noise and no frame: another baud rate, or another device?"
+                    if line.grows
+                    else "open, but no byte comes: is the block switched on?"
+                )
+                self.say(f"{name}/imu: {what} Listening on")
+            elif line.is_bad and not is_bad:
+                self.say(f"{name}/imu: samples come")
+            line.is_bad = is_bad
+            self._look_at_valves(name, vehicle, now_ns)
+
+    def _look_at_valves(self, name: str, vehicle: VehicleMonitor, now_ns: int) -> None:
+        bus = self.ports.get("valve_bus")
+        is_silent = (
+            bus is not None
+            and bus.level == 0
+            and now_ns - bus.stamp_ns > SILENT_S * 1e9
+            and vehicle.rate_hz(m.ValveStatus, now_ns) == 0.0
+        )
+        if is_silent and name not in self._silent_nodes:
+            self._silent_nodes.add(name)
+            self.say(f"{name}: its valve node says nothing; without word from us it keeps its valves closed")
+        elif not is_silent and name in self._silent_nodes:
+            self._silent_nodes.discard(name)
+            self.say(f"{name}: its valve node speaks")
+
     def _diagnostics(self, payload: m.Diagnostics) -> None:
-        is_port = "/" in payload.node and not payload.keys
+        is_port = bool(payload.summary) and not payload.keys
         known = self.ports if is_port else self.nodes
         before = known.get(payload.node)
         known[payload.node] = payload
-        if payload.summary and (before is None or before.summary != payload.summary):
+        counters = dict(zip(payload.keys, payload.values, strict=False))
+        if "bytes_seen" in counters:
+            line = self._lines_of.setdefault(payload.node.partition("/")[0], _Line())
+            seen = int(counters["bytes_seen"])
+            line.bytes_seen, line.grows = seen, seen > line.bytes_seen
+        said = payload.summary.partition(_SOON_AGAIN)[0]
+        if said and (before is None or before.summary.partition(_SOON_AGAIN)[0] != said):
             self.say(payload.summary)
 
     @staticmethod
