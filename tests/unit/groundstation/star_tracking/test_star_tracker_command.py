@@ -1,0 +1,151 @@
+"""``groundstation star-tracker``: tables out of folders, and one sentence for whatever is wrong."""
+
+import csv
+import json
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from groundstation.cli.errors import UsageError
+from groundstation.cli.star_tracker import COLUMNS, app
+
+POSES = ((2.0, 1.8, 0.5), (2.6, 2.1, -2.0))
+
+
+@pytest.fixture(scope="module")
+def ceiling_folder(tmp_path_factory, painter):
+    """Two good pictures and a black one."""
+    folder = tmp_path_factory.mktemp("ceiling")
+    (folder / "frames").mkdir()
+    (folder / "camera.json").write_text(json.dumps(painter.camera.to_mapping()))
+    rows = [f"{i},{x:.6f},{y:.6f}" for i, (x, y) in enumerate(painter.stars_m)]
+    (folder / "ceiling.csv").write_text("\n".join(["id,x_m,y_m", *rows]) + "\n")
+    rng = np.random.default_rng(61)
+    for number, pose in enumerate(POSES):
+        cv2.imwrite(str(folder / "frames" / f"{number:05d}.png"), painter.paint(rng, pose))
+    cv2.imwrite(str(folder / "frames" / "00002.png"), np.zeros((480, 640), np.uint8))
+    return folder
+
+
+def call(*arguments):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def copy_of(folder, tmp_path):
+    (tmp_path / "frames").mkdir()
+    for path in [*folder.glob("*.*"), *folder.glob("frames/*")]:
+        (tmp_path / path.relative_to(folder)).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+@pytest.mark.parametrize("method", ["default", "published"])
+def test_every_frame_gets_its_row_with_the_columns_of_the_format(ceiling_folder, tmp_path, method):
+    out = tmp_path / "answers.csv"
+    call("solve", ceiling_folder, "--out", out, "--method", method)
+    with out.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == COLUMNS
+    assert [row["frame"] for row in rows] == ["00000", "00001", "00002"]
+    assert [row["fix"] for row in rows] == ["1", "1", "0"]
+    assert (rows[2]["x_m"], rows[2]["std_x_m"], rows[2]["stars"]) == ("", "", "0")
+    assert rows[2]["reason"]
+    assert all(float(row["ms"]) > 0.0 for row in rows)
+    reach = 1e-4 if method == "default" else 0.02
+    for row, pose in zip(rows[:2], POSES, strict=True):
+        assert np.hypot(float(row["x_m"]) - pose[0], float(row["y_m"]) - pose[1]) < reach
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda p: p.write_bytes(b""), "is an empty file"),
+        (lambda p: p.write_bytes(p.read_bytes()[: p.stat().st_size // 2]), "cut short"),
+        (lambda p: p.write_bytes(b"no picture at all IEND\xaeB`\x82"), "no picture"),
+        (lambda p: cv2.imwrite(str(p), np.zeros((480, 640, 3), np.uint8)), "colour"),
+        (lambda p: cv2.imwrite(str(p), np.zeros((240, 320), np.uint8)), "320 x 240"),
+        (lambda p: cv2.imwrite(str(p), np.zeros((480, 640), np.uint16)), "16-bit"),
+    ],
+)
+def test_a_bad_picture_is_named_and_nothing_is_written(ceiling_folder, tmp_path, make, words):
+    folder = copy_of(ceiling_folder, tmp_path)
+    make(folder / "frames" / "00001.png")
+    with pytest.raises(UsageError, match=words) as refusal:
+        call("solve", folder, "--out", folder / "answers.csv")
+    assert "00001.png" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert sorted(p.name for p in folder.iterdir()) == ["camera.json", "ceiling.csv", "frames"]
+
+
+def test_missing_folders_files_and_targets_are_named(ceiling_folder, tmp_path):
+    with pytest.raises(UsageError, match="no such folder"):
+        call("solve", tmp_path / "nowhere", "--out", tmp_path / "a.csv")
+    folder = copy_of(ceiling_folder, tmp_path)
+    with pytest.raises(UsageError, match="cannot be written"):
+        call("solve", folder, "--out", folder / "no" / "a.csv")
+    (folder / "ceiling.csv").unlink()
+    with pytest.raises(UsageError, match=r"ceiling\.csv"):
+        call("solve", folder, "--out", folder / "a.csv")
+
+
+def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(ceiling_folder, tmp_path, painter):
+    rng = np.random.default_rng(62)
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    camera = painter.camera.with_height(1.08 * painter.camera.ceiling_height_above_camera_m)
+    (tmp_path / "camera.json").write_text(json.dumps(camera.to_mapping()))
+    anchors = ["id,x_m,y_m,frame,u,v"]
+    for number in range(8):
+        pose = (1.6 + 0.25 * number, 1.9 + 0.1 * (number % 3), 0.3 * number)
+        cv2.imwrite(str(frames / f"{number:05d}.png"), painter.paint(rng, pose))
+        if number in (1, 6):
+            star = painter.visible(pose, margin_px=60)[0 if number == 1 else -1]
+            (x, y), (u, v) = painter.stars_m[star], painter.project(*pose)[star]
+            anchors.append(f"{star},{x:.4f},{y:.4f},{number:05d},{u:.1f},{v:.1f}")
+    (tmp_path / "anchors.csv").write_text("\n".join(anchors) + "\n")
+    result = call(
+        *("survey", tmp_path, "--out", tmp_path / "ceiling.csv", "--plot", tmp_path / "residuals.png"),
+        *("--camera-out", tmp_path / "found.json", "--verify-every", 4),
+    )
+    assert "verification" in result.stdout
+    assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
+    header = (tmp_path / "ceiling.csv").read_text().splitlines()[0]
+    assert header == "id,x_m,y_m,std_x_m,std_y_m,times_seen"
+    (tmp_path / "camera.json").write_text((tmp_path / "found.json").read_text())
+    call("solve", tmp_path, "--out", tmp_path / "answers.csv")
+    with (tmp_path / "answers.csv").open(newline="") as file:
+        assert [row["fix"] for row in csv.DictReader(file)] == ["1"] * 8
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("id,x_m,y_m,frame,u,v\n0,1,1,00000,9,9\n", "at least two"),
+        ("id,x_m,y_m,frame,u\n0,1,1,00000,9\n", "column 'v'"),
+        ("id,x_m,y_m,frame,u,v\n0,1,1,77777,9,9\n", "77777"),
+        ("id,x_m,y_m,frame,u,v\n0,1,east,00000,9,9\n", "y_m is 'east'"),
+    ],
+)
+def test_wrong_anchors_are_refused_in_one_sentence(ceiling_folder, tmp_path, text, words):
+    folder = copy_of(ceiling_folder, tmp_path)
+    (folder / "anchors.csv").write_text(text)
+    with pytest.raises(UsageError, match=words):
+        call("survey", folder, "--out", folder / "sky.csv")
+    assert not (folder / "sky.csv").exists()
+
+
+def test_the_lens_from_the_stars_is_written_with_its_provenance(ceiling_folder, tmp_path, painter):
+    folder = copy_of(ceiling_folder, tmp_path)
+    rng = np.random.default_rng(63)
+    for number in range(3, 7):
+        pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.7), rng.uniform(-3, 3))
+        cv2.imwrite(str(folder / "frames" / f"{number:05d}.png"), painter.paint(rng, pose))
+    call("intrinsics", folder, "--out", folder / "lens.toml", "--camera-out", folder / "better.json")
+    text = (folder / "lens.toml").read_text()
+    for part in ("made_utc", "recording_sha256", "[fx]", "[k2]", "std = ", "[residual.reprojection_rms]"):
+        assert part in text
+    assert json.loads((folder / "better.json").read_text())["fx"] == pytest.approx(painter.camera.fx, abs=1.0)
