@@ -33,6 +33,7 @@ TILT_SUM_TOLERANCE_COUNTS = 40.0  # D
 TILT_TEMPERATURE_NULL_COUNTS = 197.0  # S, at 0 degC
 TILT_TEMPERATURE_SCALE_COUNTS_K = -1.083  # S
 
+GYRO_STUCK_POLLS = 500  # D: with 0.4 counts rms per poll, the least noise published, chance is below 1e-40
 GYRO_STEP_COUNTS = 600.0  # D: 146 deg/s between neighbouring frames; self-test is 221 counts
 
 
@@ -75,6 +76,8 @@ class SensorFault(IntFlag):
     REPORTED_TILT_Y = 0x100
     SELF_TEST = 0x200
     """Not a fault, but the readings are not motion."""
+    GYRO_STUCK = 0x400
+    """The gyro's code has not changed for half a second: noise alone would have moved it."""
 
 
 _NO_STATUS = Status(0)
@@ -90,6 +93,7 @@ class Plausibility:
     def __init__(self) -> None:
         self._last_off = 0
         self._last_gyro_counts: float | None = None
+        self._still_polls = 0
 
     def update(self, frame: ImuFrame, status: Status = _NO_STATUS) -> SensorFault:
         """Return the faults that hold with this frame.
@@ -102,6 +106,9 @@ class Plausibility:
         gyro, last = frame.gyro_counts, self._last_gyro_counts
         if last is not None and abs(gyro - last) > GYRO_STEP_COUNTS:
             off |= SensorFault.GYRO_STEP.value
+        self._still_polls = self._still_polls + frame.sample_count if gyro == last else 0
+        if self._still_polls >= GYRO_STUCK_POLLS:
+            off |= SensorFault.GYRO_STUCK.value
         self._last_gyro_counts = gyro
         if abs(gyro - GYRO_NULL_COUNTS) > GYRO_RANGE_COUNTS:
             off |= SensorFault.GYRO_RANGE.value

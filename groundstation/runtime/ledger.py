@@ -5,7 +5,7 @@ holds the fix, first wrench from such a state, valve command, CAN frame. *Inerti
 published. Every valve command names its causes; ``causes_of`` walks them back.
 """
 
-from collections import OrderedDict, deque
+from collections import OrderedDict, defaultdict, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -59,12 +59,12 @@ class Ledger:
     """Follows the messages of all vehicles; give it every message of ``HEARD`` in any order."""
 
     def __init__(self) -> None:
-        self._vehicles: dict[str, _Vehicle] = {}
+        self._vehicles: defaultdict[str, _Vehicle] = defaultdict(_Vehicle)
 
     def take(self, delivered: Delivered) -> None:
         """Account for one message."""
         envelope, payload = delivered
-        vehicle = self._vehicles.setdefault(payload.vehicle, _Vehicle())
+        vehicle = self._vehicles[payload.vehicle]
         key = Cause(envelope.topic.index, envelope.sequence)
         _keep(vehicle.envelopes, key, envelope)
         match payload:
@@ -88,7 +88,7 @@ class Ledger:
 
     def causes_of(self, vehicle: str, cause: Cause) -> Iterator[Envelope]:
         """Envelopes of a message and of all it was made from, newest first, as far as still kept."""
-        kept = self._vehicles.get(vehicle, _Vehicle()).envelopes
+        kept = self._vehicles[vehicle].envelopes
         waiting, seen = [cause], {cause}
         while waiting:
             envelope = kept.get(waiting.pop(0))
@@ -105,7 +105,7 @@ class Ledger:
 
     def summary(self, vehicle: str, stamp_ns: int) -> m.Latency:
         """Ages of the last ``_WINDOW`` samples per stage, as the bus reports them; NaN where none."""
-        ages = self._vehicles.setdefault(vehicle, _Vehicle()).ages_s
+        ages = self._vehicles[vehicle].ages_s
         p50, p99 = [], []
         for stage in STAGES:
             values = np.fromiter(ages[stage], float)

@@ -48,13 +48,15 @@ def test_noise_on_the_line_is_counted_by_its_name(fly, kind, parameters, counter
 def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
     flight = fly(fault("stuck_gyro", code=0)).run(STOP_S)
     samples = flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S)
-    assert {imu.reason for imu in samples} == {"gyro_range"}
+    assert all("gyro_range" in imu.reason for imu in samples)
     assert not any(imu.valid for imu in samples)
     assert_survived(flight)
 
 
 def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
     flight = fly(fault("stuck_gyro")).run(STOP_S + 6.0)
+    late = flight.of(m.Imu, start_s=FAULT_S + 0.6, stop_s=END_S - 0.1)
+    assert {imu.reason for imu in late} == {"gyro_stuck"}
     assert flight.of(m.VehicleState)[-1].status == "flying"
     distances, _ = flight.off_goal(start_s=STOP_S + 5.5)
     assert distances.max() < 0.4

@@ -109,3 +109,11 @@ def test_slow_quantities_are_collected_and_unknown_until_heard():
     assert environment.temperature_tilt_x_c == pytest.approx(24.93, abs=0.01)
     assert environment.temperature_tilt_y_c == pytest.approx(29.55, abs=0.01)
     assert (environment.status, environment.commands_refused) == (Status.RESET_WATCHDOG, 3)
+
+
+def test_a_gyro_code_that_never_moves_for_half_a_second_is_stuck_until_it_moves():
+    watch = Plausibility()
+    faults = [watch.update(frame()) for _ in range(501)]
+    assert faults[:500] == [SensorFault(0)] * 500
+    assert faults[500] == SensorFault.GYRO_STUCK
+    assert watch.update(frame(gyro=2048.25)) == SensorFault(0)
