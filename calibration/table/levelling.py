@@ -29,6 +29,11 @@ class LegAdvice:
     std_m: float
     """Against the leg that stays."""
 
+    @property
+    def must_be_raised(self) -> bool:
+        """Whether it differs from level by more than its uncertainty."""
+        return self.raise_m > max(SIGMAS * self.std_m, COARSEST_M)
+
 
 @dataclass(frozen=True, slots=True)
 class Levelling:
@@ -48,7 +53,7 @@ class Levelling:
         lines = []
         for leg in self.legs:
             spread = f"(± {1e3 * leg.std_m:.2f} mm)"
-            if leg.raise_m <= max(SIGMAS * leg.std_m, COARSEST_M):
+            if not leg.must_be_raised:
                 lines.append(f"Leave leg {leg.name} as it is.")
             else:
                 lines.append(f"Raise leg {leg.name} by {1e3 * leg.raise_m:.2f} mm {spread}.")
@@ -84,5 +89,5 @@ def levelling(
     legs = tuple(
         LegAdvice(name, float(lift[i] - lift[lowest]), float(std[i])) for i, name in enumerate(legs_m)
     )
-    is_level = all(leg.raise_m <= max(SIGMAS * leg.std_m, COARSEST_M) for leg in legs)
+    is_level = not any(leg.must_be_raised for leg in legs)
     return Levelling(legs, is_level, float(std.max()))
