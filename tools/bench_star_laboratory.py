@@ -1,0 +1,170 @@
+"""Frames of the emulator's sky with truth, and scores over them, for ``bench_star_tracker.py``."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calibration.camera import CameraCalibration
+from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
+from firmware_emulator.sky.sensor import SensorSettings
+from firmware_emulator.sky.sky_camera import Shutter, SkyCamera
+from groundstation.star_tracking.detection import Spots, detect
+from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.sky_adjustment import project
+
+RIG = Path(__file__).resolve().parents[1] / "calibration" / "rigs" / "emulated"
+CAMERA_FILE, CEILING_FILE = RIG / "camera.json", RIG / "ceiling.csv"
+TAGS = ("easy", "edge", "blur", "false-lights", "leds-out", "mixed", "sparse", "dark")
+Triple = Sequence[float] | np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture with its truth; ``pose`` is None where no ceiling is shown."""
+
+    tag: str
+    image: np.ndarray
+    pose: tuple[float, float, float] | None
+
+
+class Laboratory:
+    """The emulator's sky above one camera."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.leds = read_ceiling(CEILING_FILE)
+        self.optics = read_camera(CAMERA_FILE)
+        self.sky = build_sky(self.leds, np.random.SeedSequence(seed))
+        self._settings = SensorSettings()
+        self._number = 0
+        self._cameras: dict[tuple[float, float], SkyCamera] = {}
+
+    def picture(
+        self,
+        pose: Triple,
+        velocity: Triple = (0.0, 0.0, 0.0),
+        exposure_s: float = 0.01,
+        readout_s: float = 0.0,
+        *,
+        is_sky_dead: bool = False,
+        false_lights: float = 0.0,
+    ) -> np.ndarray:
+        """Picture whose middle of exposure is at the pose; velocity in table axes."""
+        key = (exposure_s, readout_s)
+        if key not in self._cameras:
+            seed = np.random.SeedSequence(7)
+            shutter = Shutter(exposure_s, readout_s)
+            self._cameras[key] = SkyCamera(self.optics, self.sky, shutter, self._settings, seed)
+        half = 0.5 * (exposure_s + readout_s) * np.asarray(velocity)
+        self._number += 1
+        start, end = np.asarray(pose) - half, np.asarray(pose) + half
+        return self._cameras[key].render(
+            tuple(start),
+            tuple(end),
+            sequence=self._number,
+            is_sky_dead=is_sky_dead,
+            false_lights=false_lights,
+        )
+
+    def poses(self, count: int, edge_m: float = 1.2) -> np.ndarray:
+        """Random poses (count, 3) away from the edge."""
+        low, high = self.leds.min(axis=0) + edge_m, self.leds.max(axis=0) - edge_m
+        return np.column_stack(
+            (self.rng.uniform(low, high, (count, 2)), self.rng.uniform(-np.pi, np.pi, count))
+        )
+
+    def frames(self, tag: str, count: int) -> Iterator[Frame]:
+        """Frames of one kind."""
+        rng, leds = self.rng, len(self.leds)
+        for pose in self.poses(count):
+            velocity, exposure, changes = np.zeros(3), 0.01, {}
+            self.sky.revive()
+            if tag == "edge":
+                pose[0] = self.leds[:, 0].min() + 0.4 if rng.random() < 0.5 else self.leds[:, 0].max() - 0.4
+            if tag in ("blur", "mixed"):
+                velocity, exposure = rng.uniform(-1.0, 1.0, 3) * (1.0, 1.0, 1.3), 0.033
+            if tag in ("false-lights", "mixed"):
+                changes["false_lights"] = float(rng.integers(5, 14))
+            if tag in ("leds-out", "mixed"):
+                self.sky.kill(np.flatnonzero(rng.random(leds) < rng.uniform(0.2, 0.5)))
+            if tag == "sparse":
+                self.sky.kill(self._all_but_a_few(pose, int(rng.integers(4, 11))))
+            if tag == "dark":
+                changes |= {"is_sky_dead": True, "false_lights": float(rng.integers(10, 60))}
+            image = self.picture(pose, velocity, exposure, **changes)
+            yield Frame(tag, image, None if tag == "dark" else tuple(pose))
+        self.sky.revive()
+
+    def _all_but_a_few(self, pose: np.ndarray, left: int) -> np.ndarray:
+        camera = CameraCalibration.load(CAMERA_FILE)
+        uv, _ = project(camera, np.tile(pose, (len(self.leds), 1)), self.leds)
+        inside = (uv > 8).all(axis=1) & (uv < (camera.width - 9, camera.height - 9)).all(axis=1)
+        near = np.hypot(*(self.leds - pose[:2]).T) < 2.0
+        kept = self.rng.permutation(np.flatnonzero(inside & near))[:left]
+        return np.setdiff1d(np.arange(len(self.leds)), kept)
+
+
+@dataclass
+class Score:
+    """Errors and times of one method."""
+
+    error: list[tuple[str, np.ndarray]]
+    missed: list[str]
+    false: int
+    detect_ms: list[float]
+    solve_ms: list[float]
+    dark_ms: list[float]
+    chi2: list[float]
+
+    def rms(self, tag: str) -> tuple[float, float]:
+        """Position (mm) and heading (deg) of one kind."""
+        errors = np.array([e for t, e in self.error if t == tag])
+        if len(errors) == 0:
+            return float("nan"), float("nan")
+        position = 1e3 * np.sqrt((errors[:, :2] ** 2).sum(axis=1).mean())
+        return float(position), float(np.degrees(np.sqrt((errors[:, 2] ** 2).mean())))
+
+    def rate(self, tag: str) -> float:
+        """Share of one kind that was identified."""
+        found = sum(t == tag for t, _ in self.error)
+        return found / max(found + sum(t == tag for t in self.missed), 1)
+
+
+def run(frames: list[Frame], solve: Callable[[Spots], object]) -> Score:
+    """Solve every frame; a fix outside 20 mm or 1 deg, or on a dark sky, is false."""
+    score = Score([], [], 0, [], [], [], [])
+    for frame in frames:
+        begin = time.process_time()
+        spots = detect(frame.image)
+        middle = time.process_time()
+        answer = solve(spots)
+        end = time.process_time()
+        score.detect_ms.append(1e3 * (middle - begin))
+        score.solve_ms.append(1e3 * (end - middle))
+        is_fix = isinstance(answer, StarFix)
+        if frame.pose is None:
+            score.false += is_fix
+            score.dark_ms.append(1e3 * (end - begin))
+            continue
+        if not is_fix:
+            score.missed.append(frame.tag)
+            continue
+        error = np.array([answer.x_m - frame.pose[0], answer.y_m - frame.pose[1], 0.0])
+        error[2] = np.angle(np.exp(1j * (answer.heading_rad - frame.pose[2])))
+        if np.hypot(error[0], error[1]) > 0.02 or abs(error[2]) > np.radians(1.0):
+            score.false += 1
+            score.missed.append(frame.tag)
+            continue
+        score.error.append((frame.tag, error))
+        score.chi2.append(float(error @ np.linalg.solve(answer.cov, error)) / 3.0)
+    return score
+
+
+def spots_at(uv: np.ndarray, sigma_px: float = 0.03) -> Spots:
+    """Spots without a picture."""
+    n = len(uv)
+    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    return Spots(uv[:, 0], uv[:, 1], np.linspace(9, 3, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
