@@ -4,7 +4,7 @@
     python tools/bench_fusion.py --samples FOLDER    also every data set with truth below FOLDER
 
 Figures are those of the data sets' scorer: RMS over the flight from 10 s after its start, in a star outage
-only before and after it; over seeds the RMS of the RMS, the mean of the p99. Wall clocks on a shared machine are
+only before and after it; over seeds the RMS of RMS, the mean of p99. Wall clocks on a shared machine are
 noisy, so times are process time. filterpy is a peer when it is installed (`pip install filterpy`).
 """
 

@@ -1,4 +1,4 @@
-"""Calibration from flights: everything at once by the smoother, and the map of the table.
+"""Calibration from a flight: every constant at once, by the smoother.
 
 Mounted by `groundstation calibrate`.
 """
@@ -18,20 +18,12 @@ from calibration.imu.result import CalibrationResult, Quantity, provenance_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion import estimate
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
-from groundstation.cli.table_map_file import map_lines
 from groundstation.fusion import error_state as es
 from groundstation.fusion.estimator import FixAccount
-from groundstation.fusion.map_learning import learn, on_grid
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.fusion.table_map import levelling_m
 
-GRID_STEP_M = 0.05
-BUMP_WIDTH_M = 0.10
-WAVINESS_M_S2 = 2.2e-4
-"""RMS of the departure from the mean slope that is expected of a levelled table, per axis."""
-LEFT_TO_FILTER_M_S2 = 5e-5
 WIDE_GATE = 60.0
-"""While a map or a scale is still unknown, good fixes look worse than they are."""
+"""While a scale is still unknown, good fixes look worse than they are."""
 CONSTANTS = {
     "gyro_bias": (es.GYRO_BIAS, "rad/s"),
     "acc_bias_x": (es.ACC_BIAS_X, "m/s^2"),
@@ -123,73 +115,3 @@ def _residuals(data: FusionFolder, smoother: OfflineSmoother, used: list[FixAcco
             at = [float(np.interp(exposure, t, column)) for column in pose.T]
             rows.append([exposure, x - at[0], y - at[1], math.remainder(heading - at[2], math.tau)])
     return np.array(rows).reshape(-1, 4)
-
-
-def table_map(
-    folders: Annotated[list[Path], typer.Argument(help="Recordings over the same table; laps are best.")],
-    out: OutOption,
-    plot: PlotOption = None,
-    legs: Annotated[
-        str | None, typer.Option(help='Where the legs stand, m: "A=-1,-0.8 B=1,-0.8 C=0,0.9".')
-    ] = None,
-) -> None:
-    """Learn the table's slope from laps: a map for filter and controller, and advice for levelling.
-
-    Example: groundstation calibrate table-map lap1/ lap2/ lap3/ --out table.csv --plot table.png
-    """
-    places = _legs(legs)
-    traces = []
-    for folder in folders:
-        data = read_folder(folder)
-        noise = replace(data.noise, waviness_sigma_m_s2=LEFT_TO_FILTER_M_S2, gate_nis=WIDE_GATE)
-        smoother = OfflineSmoother(noise)
-        estimate(data, smoother)
-        smoother.finish()
-        traces.append(smoother.trace)
-    try:
-        learned = learn(traces, WAVINESS_M_S2, BUMP_WIDTH_M)
-    except ValueError as error:
-        raise UsageError(f"{folders[0]}: {error}.") from None
-    grid = on_grid(learned, GRID_STEP_M)
-    tilt = (float(learned.tilt_m_s2[0]) / 9.80665, float(learned.tilt_m_s2[1]) / 9.80665)
-    quantities = {
-        f"tilt_{axis}": Quantity(tilt[k], float(learned.tilt_std_m_s2[k]) / 9.80665, "rad")
-        for k, axis in enumerate("xy")
-    }
-    advice = (
-        {name: Quantity(rise, math.nan, "m") for name, rise in levelling_m(tilt, places).items()}
-        if places
-        else {}
-    )
-    provenance = provenance_of(folders[0], datetime.now(UTC))
-    result = CalibrationResult(
-        "Mean tilt of the table (pull over g); the map is in the CSV of the same name",
-        provenance,
-        quantities | {f"raise_leg_{name}": rise for name, rise in advice.items()},
-        {},
-        {"recordings": [folder.name for folder in folders], "explained_share_of_nis": learned.explained},
-    )
-    write_atomically({out: map_lines(grid), out.with_suffix(".toml"): [result.to_toml()]})
-    print(
-        f"tilt {1e3 * tilt[0]:.3f}, {1e3 * tilt[1]:.3f} mrad; "
-        f"the map explains {100 * learned.explained:.0f} % of the innovations' squares"
-    )
-    for name, rise in advice.items():
-        print(f"raise leg {name} by {1e3 * rise.value:.2f} mm" if rise.value > 5e-5 else f"leg {name} stays")
-    if plot is not None:
-        from groundstation.cli.calibration_plots import plot_map
-
-        plot_map(grid, learned.path_m, plot)
-
-
-def _legs(text: str | None) -> dict[str, tuple[float, float]]:
-    """Read "A=x,y B=x,y"."""
-    places: dict[str, tuple[float, float]] = {}
-    for item in (text or "").split():
-        name, _, place = item.partition("=")
-        try:
-            x, y = (float(value) for value in place.split(","))
-        except ValueError:
-            raise UsageError(f'--legs must read like "A=-1,-0.8 B=1,-0.8", found {item!r}.') from None
-        places[name] = (x, y)
-    return places

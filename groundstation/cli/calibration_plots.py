@@ -16,7 +16,6 @@ from calibration.imu.gyro_scale import GyroScale
 from calibration.imu.temperature import TemperatureSlope
 from calibration.imu.zero_offset import ZeroOffset
 from groundstation.cli.errors import UsageError
-from groundstation.fusion.table_map import TableMap
 
 Array = NDArray[np.float64]
 
@@ -116,27 +115,4 @@ def plot_residuals(residual: Array, nis: Array, path: Path) -> None:
     axes[3].set_ylabel("NIS")
     axes[3].legend()
     axes[3].set_xlabel("exposure, s")
-    _save(figure, path)
-
-
-def plot_map(grid: TableMap, flown_m: Array, path: Path) -> None:
-    """Draw the pull along both axes and its sigma as heat maps, with the paths flown."""
-    figure = Figure(figsize=(8, 12), layout="constrained")
-    rows, columns = grid.pull_x_m_s2.shape
-    half = grid.step_m / 2.0
-    extent = (
-        grid.x0_m - half, grid.x0_m + (columns - 1) * grid.step_m + half,
-        grid.y0_m - half, grid.y0_m + (rows - 1) * grid.step_m + half,
-    )  # fmt: skip
-    fields = (
-        (grid.pull_x_m_s2, "pull along x, mm/s²", "coolwarm"),
-        (grid.pull_y_m_s2, "pull along y, mm/s²", "coolwarm"),
-        (grid.std_m_s2, "sigma, mm/s²", "viridis"),
-    )
-    for axes, (field, label, colours) in zip(_axes(figure, 3), fields, strict=True):
-        image = axes.imshow(1e3 * field, origin="lower", extent=extent, cmap=colours)
-        axes.plot(flown_m[:, 0], flown_m[:, 1], ",", color="k", alpha=0.5)
-        figure.colorbar(image, ax=axes, label=label)
-        axes.set_ylabel("y, m")
-    axes.set_xlabel("x, m")
     _save(figure, path)

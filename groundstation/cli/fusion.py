@@ -12,16 +12,17 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from calibration.table.errors import TableMapError
+from calibration.table.table_map import TableMap
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
-from groundstation.cli.table_map_file import read_map
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
+from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 from groundstation.fusion.stamp_ticks import StampTicks
-from groundstation.fusion.table_map import noise_with
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
@@ -80,11 +81,22 @@ def run(
 def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth: bool) -> Estimator:
     known = None
     if table_map is not None:
-        known = read_map(table_map)
+        known = _read_map(table_map)
         noise = noise_with(noise, known)
     if smooth:
         return OfflineSmoother(noise, known)
     return ErrorStateFilter(noise, table_map=known) if known else ESTIMATORS[method](noise)
+
+
+def _read_map(path: Path) -> SlopeGrid:
+    try:
+        found = TableMap.load(path)
+    except TableMapError as error:
+        raise UsageError(f"{error}.") from None
+    std = np.sqrt(0.5 * (found.std_x_m_s2**2 + found.std_y_m_s2**2))
+    return SlopeGrid(
+        found.x_min_m, found.y_min_m, found.step_m, found.ax_m_s2, found.ay_m_s2, std, found.mean_m_s2
+    )
 
 
 def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:

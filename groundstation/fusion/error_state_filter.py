@@ -19,7 +19,7 @@ from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.reckoner import Reckoner
-from groundstation.fusion.table_map import TableMap
+from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Trace
 
 STEP_S = 1.0
@@ -49,7 +49,7 @@ class ErrorStateFilter:
     """
 
     def __init__(
-        self, noise: NoiseModel, trace: Trace | None = None, table_map: TableMap | None = None
+        self, noise: NoiseModel, trace: Trace | None = None, table_map: SlopeGrid | None = None
     ) -> None:
         self.noise = noise
         self._map = table_map

@@ -35,7 +35,7 @@ from groundstation.fusion.error_state import (
 )
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import Segment
-from groundstation.fusion.table_map import TableMap
+from groundstation.fusion.slope_grid import SlopeGrid
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Flight:
     """(n,) from the middle of each packet to the end of the segment."""
 
 
-def fly(x: Array, segment: Segment, lag_difference_s: float, table_map: TableMap | None = None) -> Flight:
+def fly(x: Array, segment: Segment, lag_difference_s: float, table_map: SlopeGrid | None = None) -> Flight:
     """Integrate a segment from the nominal state.
 
     Args:

@@ -11,7 +11,7 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion.estimator import Fix
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import Segment
-from groundstation.fusion.table_map import TableMap
+from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Corrected
 
 Array = NDArray[np.float64]
@@ -112,7 +112,7 @@ class RestDisturbed(ValueError):  # noqa: N818 - it is a finding about the data
 
 
 def learn_rest(
-    x: Array, P: Array, segment: Segment, noise: NoiseModel, table_map: TableMap | None = None
+    x: Array, P: Array, segment: Segment, noise: NoiseModel, table_map: SlopeGrid | None = None
 ) -> Corrected | None:
     """Correct biases and slope in place by the mean of packets at rest.
 

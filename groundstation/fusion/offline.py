@@ -5,8 +5,8 @@ from __future__ import annotations
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.smoother import Smoothed, smooth
-from groundstation.fusion.table_map import TableMap
 from groundstation.fusion.trace import Trace
 
 
@@ -18,7 +18,7 @@ class OfflineSmoother:
         table_map: what calibration knows of the table's slope.
     """
 
-    def __init__(self, noise: NoiseModel, table_map: TableMap | None = None) -> None:
+    def __init__(self, noise: NoiseModel, table_map: SlopeGrid | None = None) -> None:
         self.noise = noise
         self.trace = Trace()
         self._map = table_map

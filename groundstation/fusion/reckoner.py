@@ -15,7 +15,7 @@ from groundstation.fusion.estimator import Counters, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
 from groundstation.fusion.packet_screen import PacketScreen
-from groundstation.fusion.table_map import TableMap
+from groundstation.fusion.slope_grid import SlopeGrid
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Reckoner:
         "omega_rad_s", "origin_ns", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
-    def __init__(self, noise: NoiseModel, counters: Counters, table_map: TableMap | None = None) -> None:
+    def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
         self._counters = counters
         self._map = table_map
         self._until_lookup = 0

@@ -21,7 +21,7 @@ from groundstation.fusion import measurements
 from groundstation.fusion.flight import fly
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
-from groundstation.fusion.table_map import TableMap
+from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Trace
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def _node(t_s: float, x: Array, P: Array, lam: Array, Lam: Array, *, is_rest: bo
 
 
 def smooth(
-    trace: Trace, history: PacketHistory, noise: NoiseModel, table_map: TableMap | None = None
+    trace: Trace, history: PacketHistory, noise: NoiseModel, table_map: SlopeGrid | None = None
 ) -> Smoothed:
     """Smooth a finished run of the filter.
 
@@ -110,7 +110,7 @@ def smooth(
 
 
 def _between(
-    before: Node, after: Node, segment: Segment, noise: NoiseModel, table_map: TableMap | None
+    before: Node, after: Node, segment: Segment, noise: NoiseModel, table_map: SlopeGrid | None
 ) -> tuple[Array, Array]:
     """Return states (n, 9) and sigmas (n, 3) at the ends of the packets of one step."""
     x = before.x
