@@ -21,10 +21,12 @@ from groundstation.cli.errors import UsageError
 Array = NDArray[np.float64]
 Legs = Mapping[str, tuple[float, float]]
 
-UNKNOWN = 0.7
+UNKNOWN = 0.6
 """Where the sigma is above this share of the waviness the map is veiled: nobody was there."""
 ARROWS = 22
 """Along the longer side."""
+ARROW_STEPS = 1.4
+"""Length of the longest arrow in distances between arrows."""
 
 
 def plot_map(
@@ -40,9 +42,10 @@ def plot_map(
     Raises:
         UsageError: the file cannot be written.
     """
-    figure = Figure(figsize=(15.0, 8.6), layout="constrained")
+    figure = Figure(figsize=(15.0, 8.6))
+    figure.set_layout_engine("constrained", h_pad=0.1)
     FigureCanvasAgg(figure)
-    places = figure.add_gridspec(2, 2, width_ratios=[1.9, 1.0])
+    places = figure.add_gridspec(2, 2, width_ratios=[1.9, 1.0], hspace=0.12)
     veil = np.hypot(made.std_x_m_s2, made.std_y_m_s2) / np.sqrt(2.0) > UNKNOWN * waviness_m_s2
     _draw_waves(figure, figure.add_subplot(places[:, 0]), made, veil, logs, legs, advice)
     _draw_relief(figure, figure.add_subplot(places[0, 1]), made, veil)
@@ -73,7 +76,7 @@ def _draw_waves(
         size, origin="lower", extent=_extent(made), cmap="YlOrRd", vmin=0.0, vmax=largest,
         interpolation="bilinear",
     )  # fmt: skip
-    bar = figure.colorbar(image, ax=axes, location="bottom", shrink=0.9, aspect=40, pad=0.02)
+    bar = figure.colorbar(image, ax=axes, location="bottom", shrink=0.9, aspect=40, pad=0.07)
     bar.set_label("acceleration about the mean, mm/s² (below) and mrad (above)")
     mrad = bar.ax.twiny()
     mrad.set_xlim(0.0, largest / G_M_S2)
@@ -127,9 +130,11 @@ def _draw_arrows(axes: Axes, made: TableMap, veil: NDArray[np.bool_], wave_x: Ar
     rows, columns = rows[shown], columns[shown]
     if not len(rows):
         return
+    shown_x, shown_y = wave_x[rows, columns], wave_y[rows, columns]
+    longest = float(np.hypot(shown_x, shown_y).max())
     axes.quiver(
-        made.x_m[columns], made.y_m[rows], wave_x[rows, columns], wave_y[rows, columns],
-        angles="xy", color="0.15", width=0.0022,
+        made.x_m[columns], made.y_m[rows], shown_x, shown_y, angles="xy", scale_units="xy",
+        scale=max(longest, 1e-12) / (ARROW_STEPS * every * made.step_m), color="0.15", width=0.0022, zorder=4,
     )  # fmt: skip
 
 

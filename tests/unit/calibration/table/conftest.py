@@ -44,7 +44,7 @@ def fly(
     laps: int = 2,
     turning: float = 1.0,
     fix_sigma_m: float = 3e-4,
-    fix_rate_hz: float = 5.0,
+    fix_rate_hz: float = 3.0,
     name: str = "lap",
 ) -> FlightLog:
     """A rest of 5 s, then smooth laps that sweep a 3 m x 2 m table, 50 packets a second."""

@@ -26,7 +26,7 @@ def grid_of(x_m, y_m, step_m=0.2):
 
 def test_the_map_explains_the_waves_along_the_laps(made_table, fly):
     rng = np.random.default_rng(11)
-    log = fly(made_table, rng, laps=3)
+    log = fly(made_table, rng, laps=3, fix_rate_hz=2.0)
     fit = learn(log)
     path = log.position_table_m[::50]
     truth = made_table.pull(path)
@@ -38,10 +38,10 @@ def test_errors_of_the_map_are_as_large_as_it_says(made_table_of, fly):
     """Joint chi-square of the field at places all over the table, over tables and flights."""
     places = grid_of(1.2, 0.8, 0.3)
     squares, mean_squares = [], []
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng([5, seed])
         table = made_table_of(rng)
-        fit = learn(fly(table, rng, laps=2, fix_sigma_m=1e-3))
+        fit = learn(fly(table, rng, laps=2, fix_sigma_m=1e-3, fix_rate_hz=2.0))
         error = (fit.acceleration_m_s2(places) - table.pull(places)).ravel()
         cov = fit.covariance(places)
         values, vectors = np.linalg.eigh(cov)
@@ -61,7 +61,7 @@ def test_what_was_never_visited_is_as_uncertain_as_before(made_table, fly):
     basis = SurfaceBasis.over((-1.5, 4.0, -1.0, 3.0), 0.5)
     wide = fit_surface([flight_equations(log, basis, PRIORS)], basis)
     far = wide.std_m_s2(np.array([[3.8, 2.8], [3.5, 2.5]]))
-    assert visited.max() < 0.3 * fit.waviness_m_s2
+    assert visited.max() < 0.4 * fit.waviness_m_s2
     assert far.min() > 0.8 * wide.waviness_m_s2
 
 
@@ -87,7 +87,7 @@ def test_the_bias_of_a_turning_flight_is_found(made_table, fly):
 
 def test_a_map_shrinks_the_error_of_an_outage_on_a_fresh_lap(made_table, fly):
     rng = np.random.default_rng(8)
-    fit = learn(fly(made_table, rng, laps=3))
+    fit = learn(fly(made_table, rng, laps=3, fix_rate_hz=2.0))
     mean, _ = fit.mean_over(grid_of(1.4, 0.9))
     fresh = fly(made_table, rng, laps=2, name="fresh")
     check = check_outages(fresh, fit.acceleration_m_s2, (float(mean[0]), float(mean[1])), PRIORS)

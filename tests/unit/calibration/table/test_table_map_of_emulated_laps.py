@@ -1,0 +1,81 @@
+"""Laps of the emulated laboratory, flown in lockstep and recorded, against the surface it was built with."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.table.equations import FlightPriors, flight_equations
+from calibration.table.prediction import check_outages
+from calibration.table.surface_basis import SurfaceBasis
+from calibration.table.surface_fit import fit_surface
+from drivers.laboratory import load_laboratory
+from firmware_emulator.plant.air_table import Surface
+from groundstation.cli.table_map_flights import read_source
+from groundstation.recording.writer import Recorder
+from groundstation.runtime.provenance import recording_info
+from groundstation.runtime.rig import load_rig
+
+EXAMPLES = Path(__file__).parents[4] / "examples"
+SEED = 4
+
+
+@pytest.fixture
+def survey_laps(monkeypatch):
+    """The example that flies the laps, as a module."""
+    spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "survey_laps", module)
+    spec.loader.exec_module(module)
+    return module
+
+
+def true_surface(rig):
+    """The surface that the laboratory draws from this seed."""
+    laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, SEED)
+    table = laboratory.config.table
+    rng = np.random.default_rng(laboratory._seeds(0, 0, 0))
+    surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
+    return lambda places: np.array([surface.slope_acceleration(x, y) for x, y in places.tolist()])
+
+
+@pytest.mark.slow
+def test_the_map_of_emulated_laps_is_the_emulated_table(tmp_path, survey_laps):
+    rig_path = EXAMPLES / "rigs" / "survey_laps.toml"
+    rig = load_rig(rig_path)
+    sources = []
+    for name, duration_s, first in (("laps", 360.0, 0), ("fresh", 150.0, 9)):
+        path = tmp_path / f"{name}.mcap"
+        with Recorder(path, recording_info(rig, rig_path, SEED, None)) as recorder:
+            survey_laps.fly(rig, duration_s, [recorder.record], SEED, first)
+        sources.append(read_source(path, None, None))
+    laps, fresh = sources[0].logs[0], sources[1].logs[0]
+    basis = SurfaceBasis.over(sources[0].bounds_m)
+    fit = fit_surface([flight_equations(laps, basis, FlightPriors())], basis)
+    truth_at = true_surface(rig)
+
+    # right along the laps, and as right as it says
+    path = laps.position_table_m[2000::400]
+    truth = truth_at(path)
+    error = fit.acceleration_m_s2(path) - truth
+    assert (error**2).mean() < 0.02 * truth.var(axis=0).mean()
+    grid = np.array(np.meshgrid(np.linspace(-1.9, 1.9, 20), np.linspace(-1.4, 1.4, 15))).reshape(2, -1).T
+    off = (fit.acceleration_m_s2(grid) - truth_at(grid)).ravel()
+    values, vectors = np.linalg.eigh(fit.covariance(grid))
+    loud = values > 1e-3 * values[-1]
+    assert 0.3 < ((vectors.T @ off)[loud] ** 2 / values[loud]).mean() < 2.0
+
+    # the mean over the table within its sigma
+    mean, cov = fit.mean_over(grid)
+    wrong = mean - truth_at(grid).mean(axis=0)
+    assert wrong @ np.linalg.solve(cov, wrong) < 12.0
+
+    # worth something on a lap it has not seen
+    there = fresh.position_table_m[2000::200]
+    unseen = truth_at(there)
+    left = np.sqrt(((fit.acceleration_m_s2(there) - unseen) ** 2).mean() / ((mean - unseen) ** 2).mean())
+    assert left < 0.25
+    check = check_outages(fresh, fit.acceleration_m_s2, (float(mean[0]), float(mean[1])), FlightPriors())
+    assert check.with_map_m < 0.35 * check.mean_only_m
