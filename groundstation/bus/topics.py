@@ -107,6 +107,7 @@ _ROWS = (
     _row("sequence_phase", m.SequencePhase, 0, latched=True),
     _row("reference_bytes", m.ReferenceBytes, 100, observers_only=True),
     _row("reference", m.ReferenceState, 100, observers_only=True),
+    _row("sky_change", m.SkyChange, 0),
     _row("calibration", m.CalibrationInUse, 0, latched=True),
     _row("diagnostics", m.Diagnostics, 1, scope=Scope.PROCESS),
     _row("journal", m.Journal, 10, scope=Scope.PROCESS),

@@ -29,7 +29,7 @@ from groundstation.messages.operation import (
     SequencePhase,
     VehicleMode,
 )
-from groundstation.messages.stars import FixBytes, StarFix, StarImage, StarSpots
+from groundstation.messages.stars import FixBytes, SkyChange, StarFix, StarImage, StarSpots
 
 __all__ = [
     "NO_STOP",
@@ -52,6 +52,7 @@ __all__ = [
     "ReferenceState",
     "Request",
     "SequencePhase",
+    "SkyChange",
     "StarFix",
     "StarImage",
     "StarSpots",

@@ -102,3 +102,25 @@ class FixBytes(Message):
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixBytes"
     data: Bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkyChange(Message):
+    """A star that died, revived, moved or appeared; the stamp is the exposure that decided.
+
+    Attributes:
+        change: ``died``, ``revived``, ``moved`` or ``appeared``.
+        star: Id of the catalogue, empty for a light that appeared.
+        x_m: Where it is seen now, or was, in the table frame.
+        y_m: Where it is seen now, or was, in the table frame.
+        place_std: Standard deviation of that place per axis, m.
+        sightings: How many sightings speak for it.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/SkyChange"
+    change: Text
+    star: Text
+    x_m: F64
+    y_m: F64
+    place_std: F64
+    sightings: U32

@@ -13,11 +13,18 @@ from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
-from groundstation.messages.definitions import CalibrationInUse, StarFix, StarSpots, VehicleState
+from groundstation.messages.definitions import (
+    CalibrationInUse,
+    SkyChange,
+    StarFix,
+    StarSpots,
+    VehicleState,
+)
 from groundstation.nodes.node import Node
 from groundstation.star_tracking import fixes, tracker
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.prior_governor import PriorGovernor
+from groundstation.star_tracking.sky_watch import SkyWatch
 
 MEMORY_NS = 2_000_000_000
 REACH_NS = 50_000_000
@@ -26,7 +33,9 @@ _NO_COVARIANCE = (math.nan,) * 9
 
 
 class StarTracker(Node):
-    """Finds the ceiling in every set of spots; from a prior where the state is known, else lost in space.
+    """Finds the ceiling in every set of spots, and names stars that died, moved or appeared.
+
+    It starts from a prior where the state is known, else lost in space.
 
     Args:
         vehicle: Its name.
@@ -40,7 +49,7 @@ class StarTracker(Node):
     """
 
     inputs = (StarSpots, VehicleState)
-    outputs = (StarFix, CalibrationInUse)
+    outputs = (StarFix, SkyChange, CalibrationInUse)
 
     def __init__(
         self,
@@ -52,9 +61,9 @@ class StarTracker(Node):
     ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
-        self._tracker = tracker.StarTracker(
-            StarCatalogue.load(ceiling), CameraCalibration.load(camera), settings
-        )
+        stars, lens = StarCatalogue.load(ceiling), CameraCalibration.load(camera)
+        self._tracker = tracker.StarTracker(stars, lens, settings)
+        self._watch = SkyWatch(stars, lens)
         self._governor = PriorGovernor()
         self._states: deque[VehicleState] = deque()
         self._stamp_sigma_s = stamp_sigma_s
@@ -71,19 +80,21 @@ class StarTracker(Node):
             case VehicleState():
                 self._remember(message)
             case StarSpots(reason="") as spots:
-                yield self._solve(spots)
+                yield from self._solve(spots)
             case StarSpots() as spots:
                 yield self._refusal(spots, spots.reason)
 
-    def _solve(self, spots: StarSpots) -> StarFix:
+    def _solve(self, spots: StarSpots) -> Iterator[Message]:
         state = self._state_at(spots.stamp_ns)
         prior = None if state is None else _prior(state, self._stamp_sigma_s)
         motion = None if state is None else fixes.BodyMotion(*state.velocity_table_m_s, state.rate_rad_s)
-        answer = self._tracker.solve(_spots(spots), self._governor.admit(prior), motion)
+        lights = _spots(spots)
+        answer = self._tracker.solve(lights, self._governor.admit(prior), motion)
         self._governor.note(answer, prior)
         if isinstance(answer, fixes.NoFix):
-            return self._refusal(spots, f"{answer.reason.value}: {answer.detail}")
-        return StarFix(
+            yield self._refusal(spots, f"{answer.reason.value}: {answer.detail}")
+            return
+        yield StarFix(
             spots.stamp_ns,
             self.vehicle,
             True,
@@ -96,6 +107,17 @@ class StarTracker(Node):
             answer.mode.value,
             "",
         )
+        for found in self._watch.note(answer, lights):
+            yield SkyChange(
+                spots.stamp_ns,
+                self.vehicle,
+                found.change.value,
+                found.star,
+                found.x_m,
+                found.y_m,
+                found.std_m,
+                found.sightings,
+            )
 
     def _remember(self, state: VehicleState) -> None:
         """Keep two seconds of states, none of them of a lost filter."""

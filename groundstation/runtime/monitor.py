@@ -129,6 +129,11 @@ class Monitor:
             self.say(
                 f"{payload.vehicle}: {payload.phase}" + (f" ({payload.detail})" if payload.detail else "")
             )
+        elif isinstance(payload, m.SkyChange):
+            star = f"star {payload.star}" if payload.star else "a light that is no star"
+            self.say(
+                f"{payload.vehicle}: {star} {payload.change} at ({payload.x_m:.3f}, {payload.y_m:.3f}) m"
+            )
         elif isinstance(payload, m.Ack) and not payload.accepted:
             self.say(f"{payload.vehicle}: {payload.action} refused: {payload.reason}")
 
