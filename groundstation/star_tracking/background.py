@@ -6,11 +6,14 @@ means, so that a star in a cell does not lift it; noise is a line in the backgro
 shot noise), fitted to a thinned sample of the smoothed picture.
 """
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.star_tracking.robust import middle_value
 
 WEIGHT_SUM = 81.0  # of the smoothing kernel, per axis 1+2+3+2+1 = 9
 WEIGHT_SQUARE_SUM = 361.0  # per axis 1+4+9+4+1 = 19: noise of the sum over noise of a pixel, squared
@@ -29,6 +32,8 @@ class Levels:
         background_coarse: The same on the coarse grid, float32.
         variance_floor_dn2: Pixel variance at zero background.
         variance_slope_dn: Growth of the pixel variance per DN of background.
+        background_dn: Median background, DN.
+        noise_dn: Standard deviation of a pixel there, DN.
     """
 
     smooth: NDArray[np.uint16]
@@ -36,16 +41,8 @@ class Levels:
     background_coarse: NDArray[np.float32]
     variance_floor_dn2: float
     variance_slope_dn: float
-
-    @property
-    def background_dn(self) -> float:
-        """Median background, DN."""
-        return float(np.median(self.background_coarse)) / WEIGHT_SUM
-
-    @property
-    def noise_dn(self) -> float:
-        """Standard deviation of a pixel at the median background, DN."""
-        return float(np.sqrt(self.variance_floor_dn2 + self.variance_slope_dn * self.background_dn))
+    background_dn: float
+    noise_dn: float
 
     def threshold(self, sigmas: float) -> NDArray[np.uint16]:
         """Level that noise exceeds with ``sigmas`` standard deviations, like ``smooth``."""
@@ -67,7 +64,9 @@ def measure_levels(image: NDArray[np.uint8]) -> Levels:
     level = background[thin].astype(np.float32).ravel()
     deviation = smooth[thin].astype(np.float32).ravel() - level
     floor, slope = _noise_line(deviation, level)
-    return Levels(smooth, background, coarse, floor, slope)
+    background_dn = middle_value(coarse) / WEIGHT_SUM
+    noise_dn = math.sqrt(floor + slope * background_dn)
+    return Levels(smooth, background, coarse, floor, slope, background_dn, noise_dn)
 
 
 def _full_size(coarse: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.uint16]:
@@ -80,7 +79,7 @@ def _full_size(coarse: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[
 def _noise_line(deviation: NDArray[np.float32], level: NDArray[np.float32]) -> tuple[float, float]:
     """Fit pixel variance = floor + slope * background (DN), stars clipped away."""
     size = np.abs(deviation)
-    scale = 1.4826 * float(np.median(size))
+    scale = 1.4826 * middle_value(size)
     kept = size <= max(4.0 * scale, 1.0)
     square = (deviation[kept].astype(np.float64) ** 2) / WEIGHT_SQUARE_SUM
     mean_dn = level[kept].astype(np.float64) / WEIGHT_SUM

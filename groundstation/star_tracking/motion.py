@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.fixes import BodyMotion
+from groundstation.star_tracking.robust import middle_value
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ def smear_from_streaks(q_body_m: Complex, streak_px: Array, jacobian_m_px: Array
     starts = [np.full(len(q), streak[0]), -1j * (q - q.mean()), -1j * q]
     ends = [_alternate(q, streak, start) for start in starts]
     smear, misfit = min(ends, key=lambda end: end[1])
-    return smear if misfit < _MAX_MISFIT_RATIO * float(np.median(np.abs(streak))) else None
+    return smear if misfit < _MAX_MISFIT_RATIO * middle_value(np.abs(streak)) else None
 
 
 def unbend(q_body_m: Complex, smear: Smear) -> Complex:
@@ -92,5 +93,5 @@ def _alternate(q: Complex, streak: Complex, model: Complex) -> tuple[Smear, floa
         b = complex(-1j * a * q_mean - s_mean)
         model = -1j * a * q - b
         misfit = np.minimum(np.abs(streak - model), np.abs(streak + model))
-        weight = 1.0 / (1.0 + (misfit / max(float(np.median(misfit)), 1e-9)) ** 2)
-    return Smear(a, b), float(np.median(misfit))
+        weight = 1.0 / (1.0 + (misfit / max(middle_value(misfit), 1e-9)) ** 2)
+    return Smear(a, b), middle_value(misfit)

@@ -5,10 +5,15 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from groundstation.star_tracking.robust import middle_value
 
 Vector = NDArray[np.float64]
 
-_STEPS = 3
+_STEPS = 2
+_LINE_PX = 3.0  # half length from where a streak is a line and no longer an oval
+_ROOT_2PI = float(np.sqrt(2.0 * np.pi))
 _MAX_STEP_PX = 2.0
 _OUTLIER_SIGMAS = 5.0
 _MISFIT_RATIO = 0.3  # the true image is no Gaussian: so much of the model is no outlier
@@ -126,7 +131,7 @@ def _shapes(moments: _Moments) -> Vector:
     """Give the Gaussian shape (uu, uv, vv; (3, n)) of every spot: round unless it surely is a streak."""
     uu, uv, vv = moments.spread_px2
     half, spread = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
-    width2 = float(np.clip(np.median(half - spread) * _TRUNCATION, *_WIDTH2_LIMITS_PX2))
+    width2 = min(max(_TRUNCATION * middle_value(half - spread), _WIDTH2_LIMITS_PX2[0]), _WIDTH2_LIMITS_PX2[1])
     long2 = half + spread
     streaked = long2 > _STREAK_RATIO2 * np.maximum(half - spread, width2 / _TRUNCATION)
     # The part of the spread beyond the round image is the streak's, along its own direction.
@@ -150,6 +155,49 @@ def _streaks(shape: Vector) -> Vector:
     return np.stack((length * np.cos(angle), length * np.sin(angle)), axis=1)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Images of long streaks: a line of light blurred by the round image of a star.
+
+    Attributes:
+        cosine: Direction, shape (n,).
+        sine: Direction, shape (n,).
+        half_px: Half length; zero for what is no long streak, shape (n,).
+        width_px: One sigma of the round image, shape (n,).
+    """
+
+    cosine: Vector
+    sine: Vector
+    half_px: Vector
+    width_px: Vector
+
+    @classmethod
+    def of(cls, streak_px: Vector, shape: Vector) -> "_Line":
+        length = np.hypot(streak_px[:, 0], streak_px[:, 1])
+        safe = np.maximum(length, 1e-9)
+        half, spread = 0.5 * (shape[0] + shape[2]), np.hypot(0.5 * (shape[0] - shape[2]), shape[1])
+        width = np.sqrt(np.maximum(half - spread, _WIDTH2_LIMITS_PX2[0]))
+        return cls(streak_px[:, 0] / safe, streak_px[:, 1] / safe, 0.5 * length, width)
+
+    def put(
+        self, owner: NDArray[np.int64], du: Vector, dv: Vector, unit: Vector, d_u: Vector, d_v: Vector
+    ) -> None:
+        """Write the image and its derivatives by the centre over those of Gaussians, in place."""
+        pixel = np.flatnonzero((self.half_px > _LINE_PX)[owner])
+        own = owner[pixel]
+        c, s, half, width = self.cosine[own], self.sine[own], self.half_px[own], self.width_px[own]
+        along = du[pixel] * c + dv[pixel] * s
+        across = (dv[pixel] * c - du[pixel] * s) / width
+        front, back = (along + half) / width, (along - half) / width
+        profile = (ndtr(front) - ndtr(back)) / (2.0 * half)
+        slope = (np.exp(-0.5 * back * back) - np.exp(-0.5 * front * front)) / (2.0 * half * width * _ROOT_2PI)
+        side = np.exp(-0.5 * across * across) / (width * _ROOT_2PI)
+        by_along, by_across = slope * side, profile * side * across / width
+        unit[pixel] = profile * side
+        d_u[pixel] = by_along * c - by_across * s
+        d_v[pixel] = by_along * s + by_across * c
+
+
 def _gauss_newton(
     pixels: SpotPixels, guess: _Moments, shape: Vector
 ) -> tuple[Vector, Vector, Vector, Vector, NDArray[np.bool_]]:
@@ -162,6 +210,9 @@ def _gauss_newton(
         (shape[0] / determinant)[owner],
     )
     norm = 1.0 / (2.0 * np.pi * np.sqrt(determinant))
+    streak = _streaks(shape)
+    line = _Line.of(streak, shape)
+    is_line = bool((line.half_px > _LINE_PX).any())
     u, v, flux = guess.u_px.copy(), guess.v_px.copy(), guess.flux_dn.copy()
     usable = ~pixels.is_saturated
     cov = guess.cov_px2
@@ -170,13 +221,16 @@ def _gauss_newton(
         du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
         along_u, along_v = a * du + b * dv, b * du + c * dv
         unit = norm[owner] * np.exp(-0.5 * (along_u * du + along_v * dv))
+        d_unit_u, d_unit_v = unit * along_u, unit * along_v
+        if is_line:
+            line.put(owner, du, dv, unit, d_unit_u, d_unit_v)
         model = flux[owner] * unit
         error = pixels.light_dn - model
         variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * np.maximum(model, 0.0)
         if step == _STEPS - 1:
             usable = usable & (error * error < _OUTLIER_SIGMAS**2 * variance + (_MISFIT_RATIO * model) ** 2)
         weight = usable / variance
-        d_u, d_v = model * along_u, model * along_v
+        d_u, d_v = flux[owner] * d_unit_u, flux[owner] * d_unit_v
         w_u, w_v, w_f = weight * d_u, weight * d_v, weight * unit
         products = np.stack(
             (

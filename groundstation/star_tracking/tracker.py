@@ -39,6 +39,9 @@ from groundstation.star_tracking.sky_index import SkyIndex
 Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 
+_WHITE_DN = 245.0
+_LONG_STREAK_PX = 12.0
+
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
@@ -47,6 +50,7 @@ class TrackerSettings:
     Attributes:
         tolerance_px: How far a triangle's lengths may be off, as pixels near the axis.
         centre_floor_px: Error of a centre that no fit knows of (PSF, survey), one sigma per axis.
+        streak_floor_ratio: The same for streaks, per length: their true shape is not quite the fitted one.
         evidence_nats: Log likelihood over chance that a fix must have: e^-t bounds the false ones.
         evidence_sigmas_px: Errors of spots that the likelihood is averaged over.
         min_stars: Stars of a fix without a prior.
@@ -61,6 +65,7 @@ class TrackerSettings:
 
     tolerance_px: float = 1.4
     centre_floor_px: float = 0.012
+    streak_floor_ratio: float = 0.002
     evidence_nats: float = 9.0
     evidence_sigmas_px: tuple[float, ...] = SIGMAS_PX
     min_stars: int = 4
@@ -116,7 +121,7 @@ class StarTracker:
             motion: Velocity during the exposure, for cameras with a rolling shutter.
         """
         n = len(spots)
-        if spots.is_flooded:
+        if spots.is_flooded or spots.background_dn > _WHITE_DN:
             return NoFix(Refusal.FLOODED, "More of the picture is lit than a sky of stars can.", n)
         if n == 0:
             return NoFix(Refusal.NO_SPOTS, "No spot stands out of the noise.", 0)
@@ -274,7 +279,10 @@ class StarTracker:
     def _covariance(
         self, spots: Spots, points: CeilingPoints, spot: Index, star: Index
     ) -> NDArray[np.float64]:
-        floor = np.array([1.0, 0.0, 1.0]) * self.settings.centre_floor_px**2
+        streak = spots.streak_px[spot]
+        length2 = (streak * streak).sum(axis=1)
+        variance_px2 = self.settings.centre_floor_px**2 + self.settings.streak_floor_ratio**2 * length2
+        floor = variance_px2[:, None] * np.array([1.0, 0.0, 1.0])
         chosen = CeilingPoints(points.q_body_m[spot], points.jacobian_m_px[spot])
         cov = spot_covariance(chosen, spots.cov_px2[spot] + floor)
         variance = self.sky.variance_m2[star]
@@ -308,7 +316,11 @@ class StarTracker:
 
     def _refusal(self, spots: Spots, search: _Search) -> NoFix:
         n = len(spots)
-        if math.isfinite(search.best_nats) and search.best_nats > 0.0:
+        length = np.hypot(spots.streak_px[:, 0], spots.streak_px[:, 1])
+        if np.count_nonzero(length > _LONG_STREAK_PX) > 0.5 * n:
+            reason = Refusal.BLURRED
+            detail = f"{n} spots, most of them streaks of {float(np.median(length)):.0f} px."
+        elif math.isfinite(search.best_nats) and search.best_nats > 0.0:
             reason, detail = Refusal.NO_CONSENSUS, "A pose explains some spots, but chance could as well."
         elif n < 2 * self.settings.min_stars:
             reason, detail = Refusal.TOO_FEW_STARS, f"{n} spots fit no place of the catalogue for certain."

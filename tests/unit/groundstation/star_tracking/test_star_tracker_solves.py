@@ -128,7 +128,7 @@ def test_a_sky_seen_in_a_mirror_is_refused(painter, tracker):
     assert isinstance(tracker.solve(detect(image)), NoFix)
 
 
-@pytest.mark.parametrize(("level", "reason"), [(0, Refusal.NO_SPOTS), (255, Refusal.NO_SPOTS)])
+@pytest.mark.parametrize(("level", "reason"), [(0, Refusal.NO_SPOTS), (255, Refusal.FLOODED)])
 def test_black_and_saturated_pictures_say_why_they_give_no_fix(tracker, level, reason):
     answer = tracker.solve(detect(np.full((480, 640), level, np.uint8)))
     assert isinstance(answer, NoFix)
