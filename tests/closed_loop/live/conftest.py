@@ -112,6 +112,10 @@ class Run:
             self._seen = since
             self.wait_for(f"{name}: flying")
 
+    def rewind(self):
+        """What was said before counts, too."""
+        self._seen = 0
+
     def forget(self):
         """Only what is said from now on counts."""
         self._seen = len(self.lines)
