@@ -12,7 +12,7 @@ import typer
 
 from calibration.imu.result import CalibrationResult, Quantity, provenance_of
 from calibration.imu.zero_offset import NotARest, ZeroOffset, zero_offset
-from groundstation.cli import calibrate_flight, table_map
+from groundstation.cli import calibrate_flight, calibrate_guided, table_map
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import (
     IMU_COLUMNS,
@@ -29,6 +29,7 @@ FolderArgument = Annotated[Path, typer.Argument(help="Folder with imu.csv (and s
 OutOption = Annotated[Path, typer.Option(help="TOML to write.")]
 PlotOption = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
 app.command("joint")(calibrate_flight.joint)
+app.command("imu")(calibrate_guided.imu)
 app.command("table-map")(table_map.table_map)
 UNITS = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}
 

@@ -20,6 +20,7 @@ from groundstation.cli.fusion import estimate
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
 from groundstation.fusion import error_state as es
 from groundstation.fusion.estimator import FixAccount
+from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 
 WIDE_GATE = 60.0
@@ -48,6 +49,31 @@ OutOption = Annotated[Path, typer.Option(help="File to write.")]
 PlotOption = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
 
 
+def widened(noise: NoiseModel) -> NoiseModel:
+    """Return a model that believes no earlier calibration of the constants."""
+    return replace(
+        noise,
+        gyro_scale_sigma=0.05,
+        acc_scale_sigma=0.05,
+        imu_offset_sigma_m=0.02,
+        tempco_sigma_ratio=1.0,
+        fix_delay_sigma_s=0.02,
+        gate_nis=WIDE_GATE,
+    )
+
+
+def constants(smoother: OfflineSmoother) -> dict[str, Quantity]:
+    """Return every constant with its sigma after a finished recording; empty if no pose was ever found."""
+    nodes = smoother.finish().nodes
+    if not nodes:
+        return {}
+    last = nodes[-1]
+    return {
+        name: Quantity(float(last.x[k]), math.sqrt(max(0.0, float(last.P[k, k]))), unit)
+        for name, (k, unit) in CONSTANTS.items()
+    }
+
+
 def joint(
     folder: Annotated[Path, typer.Argument(help="Folder with imu.csv, stars.csv and meta.json.")],
     out: OutOption,
@@ -61,25 +87,12 @@ def joint(
     Example: groundstation calibrate joint samples/fusion/spin --out joint.toml --plot residuals.png
     """
     data = read_folder(folder)
-    noise = replace(
-        data.noise,
-        gyro_scale_sigma=0.05,
-        acc_scale_sigma=0.05,
-        imu_offset_sigma_m=0.02,
-        tempco_sigma_ratio=1.0,
-        fix_delay_sigma_s=0.02,
-        gate_nis=WIDE_GATE,
-    )
+    noise = widened(data.noise)
     smoother = OfflineSmoother(noise)
     _, accounts = estimate(data, smoother)
-    nodes = smoother.finish().nodes
-    if not nodes:
+    quantities = constants(smoother)
+    if not quantities:
         raise UsageError(f"{folder}: no two star fixes agreed, so nothing can be calibrated.")
-    last = nodes[-1]
-    quantities = {
-        name: Quantity(float(last.x[k]), math.sqrt(max(0.0, float(last.P[k, k]))), unit)
-        for name, (k, unit) in CONSTANTS.items()
-    }
     used = [account for account in accounts if account.reason == "used"]
     residual = _residuals(data, smoother, used)
     spread = np.sqrt((residual[:, 1:] ** 2).mean(axis=0))

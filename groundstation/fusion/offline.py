@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
@@ -58,6 +60,10 @@ class OfflineSmoother:
     def covariance(self) -> Array:
         """Return the causal covariance (6, 6) at the newest packet."""
         return self._filter.covariance()
+
+    def sigmas(self) -> Array:
+        """Return (23,) sigmas of the error states at the last used fix, causal."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self._filter.P), 0.0)))
 
     def finish(self) -> Smoothed:
         """End the recording and smooth it."""

@@ -73,7 +73,7 @@ class SlopeGrid:
 def noise_with(noise: NoiseModel, grid: SlopeGrid) -> NoiseModel:
     """Return the model of what the map leaves unknown of the slope.
 
-    The best-known quarter of the grid is where vehicles fly; twice its sigma is left to the filter.
+    The best-known quarter of the grid is where vehicles fly; a little more than its sigma is left to do.
     """
-    left = min(2.0 * float(np.percentile(grid.std_m_s2, 25)), noise.waviness_sigma_m_s2)
+    left = min(1.25 * float(np.percentile(grid.std_m_s2, 25)), noise.waviness_sigma_m_s2)
     return replace(noise, slope_sigma_m_s2=RELEVELLING_SIGMA_M_S2, waviness_sigma_m_s2=left)
