@@ -20,7 +20,13 @@ from calibration.camera.board import Board, calibrate_from_board, find_corners
 from calibration.camera.delay import camera_delay
 from calibration.imu.result import CalibrationResult, Provenance, Quantity
 from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import find_frames, read_frame, with_progress, write_atomically
+from groundstation.cli.star_files import (
+    check_targets,
+    find_frames,
+    read_frame,
+    with_progress,
+    write_atomically,
+)
 from groundstation.cli.star_plots import plot_delay, plot_residuals
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.self_calibration import (
@@ -63,6 +69,7 @@ def intrinsics(
     Example:
       groundstation star-tracker intrinsics recordings/turn --out lens.toml --camera-out camera.json
     """
+    check_targets(out, camera_out, plot)
     camera, catalogue, pictures = _pictures(folder)
     wobble_m = None if wobble_mm is None else 1e-3 * wobble_mm
     try:
@@ -87,6 +94,7 @@ def mount(
     Example:
       groundstation star-tracker mount recordings/turn --out mount.toml --first-heading-deg 90
     """
+    check_targets(out, camera_out, plot)
     camera, catalogue, pictures = _pictures(folder)
     heading = None if first_heading_deg is None else math.radians(first_heading_deg)
     try:
@@ -114,6 +122,7 @@ def board(
       groundstation star-tracker board recordings/board --squares 9x6 --square-mm 30 --out lens.toml
     """
     cv2.setNumThreads(1)
+    check_targets(out, camera_out, plot)
     columns, _, rows = squares.partition("x")
     if not (columns.isdecimal() and rows.isdecimal()):
         raise UsageError(f"--squares is '{squares}', expected columns x rows like 9x6.")
@@ -184,6 +193,7 @@ def delay(
     Example:
       groundstation star-tracker delay recordings/wiggle --out delay.toml
     """
+    check_targets(out, plot)
     gyro = _columns(folder / "imu.csv", ("t_s", "omega_rad_s"))
     stars = _columns(folder / "stars.csv", ("t_arrival_s", "heading_rad"))
     try:

@@ -110,6 +110,21 @@ def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:
     return anchors
 
 
+def check_targets(*paths: Path | None) -> None:
+    """Refuse targets that cannot be written before any work is done.
+
+    Raises:
+        UsageError: A folder does not exist, or a target is one.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        if not path.parent.is_dir():
+            raise UsageError(f"{path}: cannot be written, there is no folder {path.parent}.")
+        if path.is_dir():
+            raise UsageError(f"{path}: cannot be written, it is a folder.")
+
+
 def write_atomically(path: Path, text: str) -> None:
     """Write a text file whole or not at all.
 

@@ -19,6 +19,7 @@ from calibration.camera import CalibrationFileError, CameraCalibration, StarCata
 from groundstation.cli import star_calibration
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
+    check_targets,
     find_frames,
     read_anchors,
     read_frame,
@@ -82,6 +83,7 @@ def solve(
       groundstation star-tracker solve recordings/ceiling --out answers.csv
     """
     cv2.setNumThreads(1)
+    check_targets(out)
     camera, catalogue = load_sky(folder)
     frames = find_frames(folder)
     solver = _solver(method, camera, catalogue)
@@ -120,6 +122,7 @@ def survey(
       groundstation star-tracker survey recordings/sweep --out ceiling.csv
     """
     cv2.setNumThreads(1)
+    check_targets(out, camera_out, plot)
     try:
         camera = CameraCalibration.load(folder / "camera.json")
     except CalibrationFileError as error:

@@ -66,14 +66,14 @@ class TrackerSettings:
     tolerance_px: float = 1.4
     centre_floor_px: float = 0.012
     streak_floor_ratio: float = 0.002
-    evidence_nats: float = 9.0
+    evidence_nats: float = 10.5
     evidence_sigmas_px: tuple[float, ...] = SIGMAS_PX
     min_stars: int = 4
     min_stars_prior: int = 3
     identified_spots: int = 60
     pair_spots: int = 12
     pair_spots_total: int = 20
-    look_ups: int = 150_000
+    look_ups: int = 100_000
     exposure_s: float = 0.0
     readout_s: float = 0.0
 

@@ -1,10 +1,12 @@
 """Blur and rolling shutter: the pose belongs to the middle of the exposure of the middle row."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from groundstation.star_tracking.detection import detect
-from groundstation.star_tracking.fixes import BodyMotion, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, Refusal, StarFix
 from groundstation.star_tracking.motion import Smear, smear_from_streaks, unbend
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
@@ -38,6 +40,16 @@ def test_the_rolling_shutter_term_takes_out_what_the_rows_saw_later(painter, cat
         with_term.append(error_mm(aware.solve(spots, motion=BodyMotion(*velocity)), pose))
     assert np.sqrt(np.mean(np.square(with_term))) < 0.1
     assert np.sqrt(np.mean(np.square(without))) > 5 * np.sqrt(np.mean(np.square(with_term)))
+
+
+def test_a_picture_of_foreign_streaks_is_refused_as_blurred(painter, catalogue, camera):
+    rng = np.random.default_rng(13)
+    elsewhere = rng.uniform((0.0, 0.0), (5.0, 4.0), painter.stars_m.shape)
+    strange = dataclasses.replace(painter, stars_m=elsewhere)
+    image = strange.paint(rng, (2.5, 2.0, 0.3), (1.2, -0.9, 0.0), exposure_s=0.05)
+    answer = StarTracker(catalogue, camera).solve(detect(image))
+    assert isinstance(answer, NoFix)
+    assert answer.reason is Refusal.BLURRED
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.04, -0.05])
