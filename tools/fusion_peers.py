@@ -19,8 +19,8 @@ class FilterpyPeer:
 
     Eight states (heading, velocity, position of the IMU point, gyro and accelerometer bias), one predict per
     packet at the exposure, an update per fix with an innovation gate that opens after four refusals, then
-    open loop to now. The bias walks fast enough to follow a slope in turning body axes. No slope, no scale, no
-    packet screen beyond a limit.
+    open loop to now. The bias walks fast enough to follow a slope in turning body axes. No slope, no
+    scale, no packet screen beyond a limit.
     """
 
     GATE = 25.0
