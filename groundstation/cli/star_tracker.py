@@ -30,7 +30,8 @@ from groundstation.cli.star_plots import plot_residuals
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.published import PublishedTracker
-from groundstation.star_tracking.survey import SurveyedSky, SurveyError
+from groundstation.star_tracking.sky_adjustment import HEIGHT
+from groundstation.star_tracking.survey import LENS, SurveyedSky, SurveyError
 from groundstation.star_tracking.survey import survey as survey_sky
 from groundstation.star_tracking.tracker import StarTracker
 
@@ -113,6 +114,9 @@ def survey(
     verify_every: Annotated[
         int, typer.Option(help="First without every so many pictures, to verify; 0: never.", min=0)
     ] = 6,
+    lens: Annotated[
+        bool, typer.Option("--lens", help="Calibrate the lens from the same sweep (write --camera-out).")
+    ] = False,
 ) -> None:
     """Make the star catalogue from the overlapping frames of a sweep.
 
@@ -128,6 +132,8 @@ def survey(
     except CalibrationFileError as error:
         raise UsageError(str(error)) from error
     frames = find_frames(folder)
+    free = LENS if lens else HEIGHT
+    tape_std_m = 1e-3 * tape_std_mm
     anchors = read_anchors(folder / "anchors.csv", [path.stem for path in frames])
     pictures = [detect(read_frame(path, camera)) for path in with_progress(frames, "finding stars")]
     try:
@@ -136,8 +142,8 @@ def survey(
             held = {i for i in range(verify_every - 1, len(frames), verify_every) if i not in kept_anyway}
             empty = detect(np.zeros((32, 32), np.uint8))
             blind = [empty if i in held else spots for i, spots in enumerate(pictures)]
-            _verify(survey_sky(blind, anchors, camera, tape_std_m=1e-3 * tape_std_mm), pictures, held)
-        sky = survey_sky(pictures, anchors, camera, tape_std_m=1e-3 * tape_std_mm)
+            _verify(survey_sky(blind, anchors, camera, tape_std_m=tape_std_m, free=free), pictures, held)
+        sky = survey_sky(pictures, anchors, camera, tape_std_m=tape_std_m, free=free)
     except SurveyError as error:
         raise UsageError(f"{folder}: {error}.") from error
     lines = ["id,x_m,y_m,std_x_m,std_y_m,times_seen"]

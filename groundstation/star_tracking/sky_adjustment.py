@@ -39,6 +39,8 @@ _SOFT_SIGMAS = 2.0
 _SETTLED_RATIO = 1e-4
 _HARD_STEPS = 4
 _HOLD_STD_M = 10.0
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
+_GROWTH = 1.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,12 +151,14 @@ def adjust(
     for step in range(iterations):
         normal, gradient = _normal_equations(camera, pose, star_m, seen, weight, free, known, in_place)
         change = _solve(normal, gradient)
-        camera = _with_values(camera, free, _values(camera, free) + change[: len(free)])
-        moved = change[len(free) :]
-        pose = pose + moved[: pose.size].reshape(-1, 3)
-        star_m = star_m + moved[pose.size :].reshape(-1, 2)
-        residual = seen.pixel - project(camera, pose[seen.frame], star_m[seen.star])[0]
-        distance2 = (residual**2).sum(axis=1) / seen.sigma_px**2
+        before = float(weight @ _distance2(_residual(camera, pose, star_m, seen), seen))
+        for share in _SHARES:  # a full step from a lens far off may lead away
+            trial = _stepped(camera, pose, star_m, free, share * change)
+            residual = _residual(*trial, seen)
+            if float(weight @ _distance2(residual, seen)) <= _GROWTH * before:
+                break
+        camera, pose, star_m = trial
+        distance2 = _distance2(residual, seen)
         scale2 = max(float(np.median(distance2)) / 1.386, 1e-6)
         used = distance2 <= _CLIP_SIGMAS**2 * 2.0 * scale2
         # Soft weights first: a picture whose guess is bad must not lose all of its stars at once.
@@ -176,6 +180,25 @@ def adjust(
     stars = slice(len(free) + pose.size, None)
     std = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(free)}
     return Adjusted(camera, pose, star_m, cov[stars, stars], std, residual, used, rms)
+
+
+def _stepped(
+    camera: CameraCalibration, pose: Array, star_m: Array, free: Sequence[str], change: Array
+) -> tuple[CameraCalibration, Array, Array]:
+    moved = change[len(free) :]
+    return (
+        _with_values(camera, free, _values(camera, free) + change[: len(free)]),
+        pose + moved[: pose.size].reshape(-1, 3),
+        star_m + moved[pose.size :].reshape(-1, 2),
+    )
+
+
+def _residual(camera: CameraCalibration, pose: Array, star_m: Array, seen: Observations) -> Array:
+    return np.asarray(seen.pixel - project(camera, pose[seen.frame], star_m[seen.star])[0])
+
+
+def _distance2(residual_px: Array, seen: Observations) -> Array:
+    return np.asarray((residual_px**2).sum(axis=1) / seen.sigma_px**2)
 
 
 def _flat(pose: Array, star_m: Array) -> Array:

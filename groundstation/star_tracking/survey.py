@@ -14,11 +14,22 @@ from numpy.typing import NDArray
 from calibration.camera.models import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.sky_adjustment import HEIGHT, Adjusted, Observations, StarPrior, adjust
+from groundstation.star_tracking.sky_adjustment import (
+    CENTRE,
+    DISTORTION,
+    HEIGHT,
+    Adjusted,
+    Observations,
+    StarPrior,
+    adjust,
+)
 from groundstation.star_tracking.sweep import Sweep, string_together
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+LENS = (*HEIGHT, "fy", *CENTRE, *DISTORTION)
+"""Height and lens; fx is held, because a level camera's picture scales with both alike."""
 
 _CLICK_REACH_PX = 12.0
 _MIN_TIMES_SEEN = 2
@@ -95,7 +106,7 @@ def survey(
         anchors: At least two stars measured by tape.
         camera: Intrinsics and mount; its height may be 10 % off.
         tape_std_m: How well the tape was read.
-        free: Camera values to adjust besides poses and stars.
+        free: Camera values to adjust besides poses and stars: ``HEIGHT``, or ``LENS`` for the lens too.
         progress: Called with the step's number and the residual RMS in px.
 
     Raises:
@@ -119,11 +130,15 @@ def survey(
     pose = np.stack((origin.real, origin.imag, sweep.pose[:, 2] + np.angle(scale_turn)), axis=1)
     guess = camera.with_height(camera.ceiling_height_above_camera_m * abs(scale_turn))
     position = np.stack((star.real, star.imag), axis=1)
+    # A lens far off must not be adjusted together with rough poses: these come first.
+    stages = [HEIGHT] if tuple(free) == HEIGHT else [HEIGHT, tuple(free)]
     while True:
         seen = _observations(pictures, sweep)
         known = StarPrior(named, tape, np.full(len(named), tape_std_m))
         try:
-            adjusted = adjust(guess, pose, position, seen, free=free, known=known, progress=progress)
+            for stage in stages:
+                adjusted = adjust(guess, pose, position, seen, free=stage, known=known, progress=progress)
+                guess, pose, position = adjusted.camera, adjusted.pose, adjusted.star_m
         except ValueError as error:
             raise SurveyError(str(error)) from error
         times_seen = np.bincount(sweep.star[adjusted.used], minlength=len(position))
@@ -134,7 +149,7 @@ def survey(
             break
         # Stray lights that happened to fall near each other: out they go, and once more.
         named = (np.cumsum(real) - 1)[named]
-        guess, pose, position = adjusted.camera, adjusted.pose, adjusted.star_m[real]
+        position = position[real]
         sweep = _only_stars(sweep, real)
     return SurveyedSky(
         ids=_ids(anchors, named, len(position)),

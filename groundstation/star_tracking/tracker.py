@@ -73,7 +73,7 @@ class TrackerSettings:
     identified_spots: int = 60
     pair_spots: int = 12
     pair_spots_total: int = 20
-    look_ups: int = 100_000
+    look_ups: int = 80_000
     exposure_s: float = 0.0
     readout_s: float = 0.0
 

@@ -16,7 +16,7 @@ from groundstation.star_tracking.sky_adjustment import (
     adjust,
     project,
 )
-from groundstation.star_tracking.survey import Anchor, SurveyError, survey
+from groundstation.star_tracking.survey import LENS, Anchor, SurveyError, survey
 
 
 def spots_at(uv, sigma_px):
@@ -73,6 +73,18 @@ def test_a_sweep_gives_the_shape_of_the_sky_and_says_how_well(painter, camera):
     assert 0.75 < np.sqrt(np.mean(normalised**2)) < 1.3
     assert sky.camera.ceiling_height_above_camera_m == pytest.approx(2.3, rel=2e-3)
     assert {"a3", "a16", "a30"} <= set(sky.ids)
+
+
+def test_a_sweep_calibrates_the_lens_as_well_from_no_distortion_at_all(painter, camera):
+    rng = np.random.default_rng(24)
+    _, pictures, names = sweep(painter, rng, lights=0)
+    rough = dataclasses.replace(camera, fx=590.0, fy=590.0, distortion=(0.0, 0.0, 0.0, 0.0, 0.0))
+    sky = survey(pictures, anchors_of(painter, pictures, names, rng), rough, free=LENS)
+    assert sky.adjusted.rms_px < 0.04
+    ratio = camera.fy / camera.fx
+    assert sky.camera.fy / sky.camera.fx == pytest.approx(ratio, abs=2e-4)
+    # The scale of distortion goes with the focal length that was held.
+    assert sky.camera.distortion[0] == pytest.approx(camera.distortion[0] * (590.0 / 598.0) ** 2, abs=2e-3)
 
 
 def test_anchors_that_cannot_fix_the_table_are_refused_in_words(painter, camera):
