@@ -71,6 +71,8 @@ class FlightEquations:
     headings_rad: float
     """How far the heading turned while fixes were taken: largest less smallest."""
     duration_s: float
+    centre_m: Array
+    """(2,) mean place of the flight."""
 
     def scaled(self, variance_ratio: float) -> FlightEquations:
         """Return the same with all variances, those of its own unknowns' priors too, this much larger."""
@@ -123,4 +125,5 @@ def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> Flig
         log.name, J[b, b] - J[b, a] @ response, h[b] - J[b, a] @ own, power - float(h[a] @ own), rows,
         own, response, cho_solve(factor, np.eye(NUISANCES)),
         float(np.ptp(heading)) if len(heading) else 0.0, float(np.ptp(log.end_s)),
+        log.position_table_m.mean(axis=0),
     )  # fmt: skip

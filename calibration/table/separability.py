@@ -13,63 +13,64 @@ from calibration.table.surface_fit import SurfaceFit
 
 Array = NDArray[np.float64]
 
-TOO_ALIKE = 0.95
-ENOUGH_M_S2 = 5e-4
-"""Sigma of slope or bias (0.05 mrad) below which their correlation does not matter."""
+ALIKE = 0.8
+ENOUGH_M_S2 = 3e-4
+"""Sigma of the pull (0.03 mrad) below which it does not matter what it is correlated with."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separability:
-    """Bias against slope in one flight."""
+    """The accelerometers' bias against the table's pull in the middle of one flight."""
 
     flight: str
     turned_rad: float
     bias_m_s2: tuple[float, float]
     bias_std_m_s2: tuple[float, float]
-    slope_std_m_s2: tuple[float, float]
+    pull_std_m_s2: tuple[float, float]
     correlation: float
-    """Largest canonical correlation of bias and slope."""
+    """Largest canonical correlation of bias and pull."""
 
     @property
     def is_separated(self) -> bool:
-        """Whether bias and slope are told apart well enough for a map."""
-        return self.correlation < TOO_ALIKE or max(self.slope_std_m_s2) < ENOUGH_M_S2
+        """Whether the pull is known well enough for a map, whatever the bias is."""
+        return max(self.pull_std_m_s2) < ENOUGH_M_S2
 
     def sentence(self) -> str:
         """Return the verdict in words."""
-        turned = math.degrees(self.turned_rad)
-        spread = 1e3 * max(self.slope_std_m_s2)
+        turned = f"{math.degrees(self.turned_rad):.0f}°"
+        known = f"(correlation {self.correlation:.2f}, slope ± {1e3 * max(self.pull_std_m_s2):.2f} mm/s²)"
         if self.is_separated:
             return (
-                f"{self.flight}: the heading turned through {turned:.0f}°, bias and slope are separated "
-                f"(correlation {self.correlation:.2f}, slope ± {spread:.2f} mm/s²)."
+                f"{self.flight}: the heading turned through {turned}, bias and slope are separated {known}."
             )
-        return (
-            f"{self.flight}: the heading turned through only {turned:.0f}°, so that accelerometer bias and "
-            f"mean slope cannot be told apart (correlation {self.correlation:.3f}, slope ± {spread:.1f} "
-            "mm/s²). Fly laps with all headings; the waves of the map do not suffer, its mean does."
-        )
+        if self.correlation > ALIKE:
+            return (
+                f"{self.flight}: the heading turned through only {turned}, so that accelerometer bias and "
+                f"slope cannot be told apart {known}. Fly laps with all headings; the waves of the map do "
+                "not suffer, its mean does."
+            )
+        return f"{self.flight}: too short or too seldom seen by the stars to tell the slope {known}."
 
 
 def separability(fit: SurfaceFit) -> list[Separability]:
     """Judge each flight of a fit."""
     out = []
-    slope_cov = fit.cov[:2, :2]
     for flight in fit.flights:
         value, cov = flight.unknowns(fit.shared, fit.cov)
-        bias_cov = cov[BIAS, BIAS]
-        cross = -(flight.response @ fit.cov)[BIAS, :2]
-        bias_root, slope_root = np.linalg.cholesky(bias_cov), np.linalg.cholesky(slope_cov)
-        whitened = np.linalg.solve(slope_root, np.linalg.solve(bias_root, cross).T)
+        A = fit.design(flight.centre_m[None])[0]
+        bias_cov, pull_cov = cov[BIAS, BIAS], A @ fit.cov @ A.T
+        cross = -(flight.response @ fit.cov)[BIAS] @ A.T
+        bias_root, pull_root = np.linalg.cholesky(bias_cov), np.linalg.cholesky(pull_cov)
+        whitened = np.linalg.solve(pull_root, np.linalg.solve(bias_root, cross).T)
         correlation = float(np.linalg.svd(whitened, compute_uv=False)[0])
-        bias_std, slope_std = np.sqrt(bias_cov.diagonal()), np.sqrt(slope_cov.diagonal())
+        bias_std, pull_std = np.sqrt(bias_cov.diagonal()), np.sqrt(pull_cov.diagonal())
         out.append(
             Separability(
                 flight=flight.name,
                 turned_rad=flight.headings_rad,
                 bias_m_s2=(float(value[0]), float(value[1])),
                 bias_std_m_s2=(float(bias_std[0]), float(bias_std[1])),
-                slope_std_m_s2=(float(slope_std[0]), float(slope_std[1])),
+                pull_std_m_s2=(float(pull_std[0]), float(pull_std[1])),
                 correlation=correlation,
             )
         )

@@ -1,7 +1,7 @@
 """The surface as a sum of smooth modes: a height field whose downhill slope pulls the vehicle.
 
 The accelerometers feel everything but gravity, so what is missing from them is the gradient of one height:
-a field without curl. The height is a Gaussian process of squared-exponential covariance, written in the
+a field without curl. The height is a Gaussian process of Matern covariance, written in the
 eigenfunctions of the Laplacian on a rectangle around the table, where the prior is diagonal (A. Solin,
 S. Sarkka, "Hilbert space methods for reduced-rank Gaussian process regression", Statistics and Computing 30,
 2020; for potentials: A. Solin et al., "Modeling and interpolation of the ambient magnetic field by Gaussian
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 MARGIN_M = 0.5
 """The rectangle of the modes is larger than the table by this, because they vanish at its border."""
+
+SMOOTHNESS = 3.5
+"""Of the Matern covariance. A smoother one believes too much of what it infers beside the lanes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,12 +88,9 @@ class SurfaceBasis:
 
         Args:
             sigma_m_s2: standard deviation of the pull, per axis.
-            length_m: of the height's squared-exponential covariance.
+            length_m: of the height's Matern covariance.
         """
         square = self.kx_rad_m[self.index[:, 0]] ** 2 + self.ky_rad_m[self.index[:, 1]] ** 2
-        potential = (sigma_m_s2 * length_m) ** 2
-        density = potential * 2.0 * math.pi * length_m**2 * np.exp(-0.5 * length_m**2 * square)
-        area = (self.bounds_m[1] - self.bounds_m[0] + 2.0 * MARGIN_M) * (
-            self.bounds_m[3] - self.bounds_m[2] + 2.0 * MARGIN_M
-        )
-        return np.asarray(density * 4.0 / area)  # the sines have norm 2 / sqrt(area)
+        density = (2.0 * SMOOTHNESS / length_m**2 + square) ** -(SMOOTHNESS + 1.0)
+        # a mode's squared gradient along an axis is k^2 / 8 on average over place and axes
+        return np.asarray(density * (sigma_m_s2**2 / float((density * square / 8.0).sum())))

@@ -73,8 +73,18 @@ def test_bias_and_slope_are_not_told_apart_without_turning(made_table, fly):
     assert straight.correlation > 0.99
     assert "straight: the heading turned through only 0°" in straight.sentence()
     assert turning.is_separated
-    assert max(turning.slope_std_m_s2) < 0.1 * max(straight.slope_std_m_s2)
+    assert max(turning.pull_std_m_s2) < 0.1 * max(straight.pull_std_m_s2)
     assert "are separated" in turning.sentence()
+
+
+def test_a_flight_that_says_nothing_is_not_called_separated(made_table, fly):
+    log = fly(made_table, np.random.default_rng(4), laps=1)
+    few = log.fix_s < 3.0
+    names = ("fix_s", "fix_position_m", "fix_cov_m2", "fix_heading_rad", "fix_velocity_m_s")
+    short = dataclasses.replace(log, rests_s=(), **{name: getattr(log, name)[few] for name in names})
+    verdict = separability(learn(short))[0]
+    assert not verdict.is_separated
+    assert "too short" in verdict.sentence() or "cannot be told apart" in verdict.sentence()
 
 
 def test_the_bias_of_a_turning_flight_is_found(made_table, fly):
@@ -123,9 +133,10 @@ def test_modes_pull_along_the_gradient_of_their_potential():
 
 
 def test_the_prior_of_the_modes_has_the_waviness_it_was_given():
-    columns = BASIS.columns(grid_of(1.2, 0.7))
-    variance = (columns**2 @ BASIS.prior_variance(3e-4, 0.3)).mean(axis=0)
-    assert np.sqrt(variance) == pytest.approx([3e-4, 3e-4], rel=0.05)
+    columns = BASIS.columns(grid_of(1.4, 0.9, 0.1))
+    for length_m in (0.3, 0.6, 1.0):
+        variance = (columns**2 @ BASIS.prior_variance(3e-4, length_m)).mean(axis=0)
+        assert np.sqrt(variance) == pytest.approx([3e-4, 3e-4], rel=0.1)
 
 
 def test_a_flight_with_hardly_any_fixes_is_refused(made_table, fly):
