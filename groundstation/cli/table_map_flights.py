@@ -126,7 +126,7 @@ def noise_of(mock_up: MockUpSection) -> NoiseModel:
     """Return the error model that a rig states for a type of mock-up."""
     imu, camera = mock_up.imu, mock_up.star_camera
     return NoiseModel(
-        packet_period_s=1.0 / imu.frame_rate_hz,
+        packet_period_s=imu.averaging * 1e-3,
         gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
         acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
         star_sigma_xy_m=camera.sigma_xy_m if camera is not None else 0.001,
