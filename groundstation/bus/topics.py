@@ -92,7 +92,7 @@ _ROWS = (
     _row("imu", m.Imu, 100),
     _row("fix_bytes", m.FixBytes, 0),
     _row("star_image", m.StarImage, 15, delivery=Delivery.NEWEST, recorded=Recorded.IMAGES),
-    _row("star_spots", m.StarSpots, 15, delivery=Delivery.NEWEST),
+    _row("star_spots", m.StarSpots, 15),
     _row("star_fix", m.StarFix, 15),
     _row("state", m.VehicleState, 100),
     _row("fix_account", m.FixAccount, 15),

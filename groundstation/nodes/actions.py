@@ -32,7 +32,12 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
         "brake": Action(
             "command_mux", (), "take the speed away and hold still, whatever the controller says"
         ),
-        "resume": Action("command_mux", (), "end braking"),
+        "resume": Action("command_mux", (), "end braking or pushing"),
+        "push": Action(
+            "command_mux",
+            ("force_x_n", "force_y_n", "torque_nm", "span_s"),
+            "push by hand, body axes, for at most 10 s; the controller waits",
+        ),
         "float_on": Action("valve_writer", (), "switch the float air on"),
         "float_off": Action("valve_writer", (), "cut the float air: the vehicle lands"),
         "go_to": Action("controller", ("x_m", "y_m", "heading_rad"), "hold another pose"),

@@ -10,6 +10,7 @@ from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux as Choice
 from groundstation.control.mux import MuxConfig, Selection, Source
 from groundstation.control.state import ControlState
+from groundstation.control.state import Wrench as BodyWrench
 from groundstation.control.vehicle import VehicleModel
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import Ack, Request, ValveDemand, ValveSelection, VehicleState
@@ -20,6 +21,7 @@ PERIOD_NS = 20_000_000
 CLOSED = bytes(8)
 RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
 SLOPE_M_S2 = 0.005  # a table half a milliradian off level
+LONGEST_PUSH_S = 10.0  # an operator who went away must not push for ever
 REACTION_S = 0.15  # age of the state, a modulation period, the opening of a valve
 
 
@@ -31,7 +33,7 @@ class CommandMux(Node):
         config: How long each source stays fresh.
         brake: The brake law.
         model: Mass properties and valves.
-        modulator: For braking, apart from that of the controller.
+        modulators: Two, for braking and for pushing by hand, apart from that of the controller.
         keep_in: Region of the table; a vehicle that would not stop inside is braked.
     """
 
@@ -44,7 +46,7 @@ class CommandMux(Node):
         config: MuxConfig,
         brake: BrakeConfig,
         model: VehicleModel,
-        modulator: PulseModulator,
+        modulators: tuple[PulseModulator, PulseModulator],
         keep_in: KeepIn,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
@@ -53,10 +55,12 @@ class CommandMux(Node):
         self._brake = brake
         self._model = model
         self._envelope = WrenchEnvelope(model)
-        self._modulator = modulator
-        self._brake_period_ns = round(modulator.config.period_s * 1e9)
+        self._modulator, self._hand = modulators
+        self._period_ns = round(self._modulator.config.period_s * 1e9)
         self._brake_due_ns = 0
         self._brake_asked = False
+        self._push: BodyWrench | None = None
+        self._push_until_ns = self._push_due_ns = 0
         self._state: ControlState | None = None
         self._braking_m_s2 = RELIED_ON * self._envelope.max_force_n / model.mass_kg - SLOPE_M_S2
         self._counter = self._pulse_id = 0
@@ -76,10 +80,13 @@ class CommandMux(Node):
                     message.rate_rad_s,
                 )
                 self._choice.hear_state(now_ns)
+            case Request(action="stop"):
+                self._choice.stop(f"asked for by {message.author}")
+                yield self._select(now_ns)
+            case Request(action="release"):
+                self._choice.release_stop()
             case Request() if is_for(message, "command_mux"):
-                reason = refusal(message)
-                if not reason:
-                    self._brake_asked = message.action == "brake"
+                reason = refusal(message) or self._carry_out(message, now_ns)
                 yield answer(message, now_ns, reason)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
@@ -87,7 +94,32 @@ class CommandMux(Node):
             self._choice.brake(now_ns, "asked for by request")
         elif self._is_leaving():
             self._choice.brake(now_ns, "it would not stop before the edge of the table")
+        if self._push is not None:
+            self._pushing(self._push, now_ns)
         yield self._select(now_ns)
+
+    def _carry_out(self, request: Request, now_ns: int) -> str:
+        """Do what was asked; the reason if it cannot be done."""
+        if request.action == "push":
+            force_x_n, force_y_n, torque_nm, span_s = request.argument
+            if not 0.0 < span_s <= LONGEST_PUSH_S:
+                return f"a push lasts up to {LONGEST_PUSH_S:g} s, asked for {span_s:g} s"
+            self._push = BodyWrench((force_x_n, force_y_n), torque_nm)
+            self._push_until_ns, self._push_due_ns = now_ns + round(span_s * 1e9), now_ns
+            self._hand.reset()
+            return ""
+        self._brake_asked = request.action == "brake"
+        self._push = None
+        return ""
+
+    def _pushing(self, push: BodyWrench, now_ns: int) -> None:
+        """Keep the operator's demand fresh, a new pulse each period, until the push has lasted."""
+        if now_ns >= self._push_until_ns:
+            self._push = None
+            self._choice.operate(CLOSED, now_ns)
+        elif now_ns >= self._push_due_ns:
+            self._choice.operate(bytes(self._hand.update(push).on_time_ms), now_ns)
+            self._push_due_ns += self._period_ns
 
     def _is_leaving(self) -> bool:
         if self._state is None:
@@ -115,7 +147,7 @@ class CommandMux(Node):
         if now_ns >= self._brake_due_ns and self._state is not None:
             wrench = brake_wrench(self._state, self._brake, self._model, self._envelope)
             self._pulse(bytes(self._modulator.update(wrench).on_time_ms))
-            self._brake_due_ns += self._brake_period_ns
+            self._brake_due_ns += self._period_ns
 
     def _pulse(self, on_time_ms: bytes) -> None:
         self._on_time_ms = on_time_ms

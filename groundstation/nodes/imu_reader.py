@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 
 from drivers.imu_block.clock import TickClock, TickStamp
-from drivers.imu_block.commands import encode_set_averaging
-from drivers.imu_block.protocol import DEFAULT_V1_SAMPLE_COUNT, FrameParser, ImuFrame
+from drivers.imu_block.commands import encode_identify, encode_set_averaging
+from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame
 from drivers.imu_block.sensors import Environment, Plausibility, rate_rad_s, specific_force_m_s2
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import Diagnostics, Imu, ImuBytes, ImuOrder, ImuRaw
@@ -13,6 +13,9 @@ from groundstation.nodes.node import Node
 
 PERIOD_NS = 1_000_000_000
 TICK_S = 1e-3
+WORST_STAMP_S = 0.25
+"""No link delays so unevenly: stamps this vague mean that the rig's averaging is not the block's."""
+OK, WARNING = 0, 1
 VERSIONS = {"auto": None, "v1": 1, "v2": 2}
 _NO_TILTS: tuple[float, ...] = ()
 
@@ -26,29 +29,44 @@ class ImuReader(Node):
         baud: Of the line.
         latency_timer_s: Of the USB adapter.
         averaging: Polls per frame. Version 2 says its own and is asked for this one if it differs;
-            version 1 does not say, so this is what it is taken to have. None: as it comes, or 8.
+            version 1 does not say, so this is what it is taken to have.
+        serial_number: Of the block that belongs here, None if any may; version 1 cannot be asked.
     """
 
     inputs = (ImuBytes,)
     outputs = (ImuRaw, Imu, ImuOrder, Diagnostics)
 
     def __init__(
-        self, vehicle: str, version: str, baud: int, latency_timer_s: float, averaging: int | None
+        self,
+        vehicle: str,
+        version: str,
+        baud: int,
+        latency_timer_s: float,
+        averaging: int,
+        serial_number: int | None,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self._parser = FrameParser(VERSIONS[version], v1_sample_count=averaging or DEFAULT_V1_SAMPLE_COUNT)
+        self._parser = FrameParser(VERSIONS[version], v1_sample_count=averaging)
         self._clock = TickClock(baud, latency_timer_s=latency_timer_s)
         self._plausibility = Plausibility()
         self._environment = Environment()
         self._averaging = averaging
         self._seen_averaging: int | None = None
+        self._serial_number = serial_number
+        self._found_number: int | None = None
+        self._complaint = ""
         self._tag = 0
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns
         assert isinstance(message, ImuBytes)
         found = self._parser.feed(message.data)
-        frames = [frame for frame in found if isinstance(frame, ImuFrame)]
+        frames = []
+        for each in found:
+            if isinstance(each, ImuFrame):
+                frames.append(each)
+            elif isinstance(each, Identity):
+                self._found_number = each.serial_number
         stamps = self._clock.update(message.stamp_ns, len(message.data), frames)
         for frame, stamp in zip(frames, stamps, strict=True):
             self._environment.update(frame)
@@ -58,10 +76,17 @@ class ImuReader(Node):
     def tick(self, now_ns: int) -> Iterator[Message]:
         counters = self._parser.counters.as_dict()
         keys, values = tuple(counters), tuple(str(count) for count in counters.values())
-        yield Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/imu_reader", 0, "", keys, values)
-        if self._averaging is not None and self._seen_averaging not in (None, self._averaging):
-            self._tag = (self._tag + 1) % 256
+        level = WARNING if self._complaint else OK
+        summary = f"{self.vehicle}/imu: samples are not believed: {self._complaint}" if level else ""
+        name = f"{self.vehicle}/imu_reader"
+        yield Diagnostics(now_ns, self.vehicle, name, level, summary, keys, values)
+        if self._parser.detected_version != 2:
+            return
+        self._tag = (self._tag + 1) % 256
+        if self._seen_averaging not in (None, self._averaging):
             yield ImuOrder(now_ns, self.vehicle, encode_set_averaging(self._tag, self._averaging))
+        elif self._serial_number is not None and self._found_number is None:
+            yield ImuOrder(now_ns, self.vehicle, encode_identify(self._tag))
 
     def _raw(self, frame: ImuFrame, stamp: TickStamp) -> ImuRaw:
         return ImuRaw(
@@ -78,7 +103,8 @@ class ImuReader(Node):
 
     def _sample(self, frame: ImuFrame, stamp: TickStamp) -> Imu:
         faults = self._plausibility.update(frame, self._environment.status)
-        self._seen_averaging = frame.sample_count if frame.version > 1 else self._averaging
+        self._seen_averaging = frame.sample_count
+        self._complaint = self._objection(stamp) or (faults.name.lower() if faults.name else "")
         x, y = frame.tilt_difference_counts
         return Imu(
             stamp.stamp_ns,
@@ -90,10 +116,18 @@ class ImuReader(Node):
             rate_rad_s(frame.gyro_counts),
             (specific_force_m_s2(x), specific_force_m_s2(y)),
             self._temperature_c(),
-            not faults,
-            faults.name.lower() if faults.name else "",
+            not self._complaint,
+            self._complaint,
             self._parser.counters.frames_lost,
         )
+
+    def _objection(self, stamp: TickStamp) -> str:
+        """Why samples of this stream cannot be used, whatever they say; empty if they can."""
+        if self._found_number is not None and self._serial_number not in (None, self._found_number):
+            return f"this is block {self._found_number}, the rig wants {self._serial_number}"
+        if stamp.stamp_std_s > WORST_STAMP_S:
+            return f"frames do not come at the rate of averaging = {self._averaging}"
+        return ""
 
     def _temperature_c(self) -> float:
         """Mean of the chips that have spoken, NaN before (and for ever with version 1)."""

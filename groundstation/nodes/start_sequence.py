@@ -76,8 +76,10 @@ class StartSequence(Node):
                 return "landed by somebody", "float air is off", ""
             if self._phase == "landed by somebody":
                 return self._phase, "", ""
-            if fusion.rest_s < self._rest_s or fusion.status != "flying":
+            if fusion.rest_s < self._rest_s:
                 return "rest calibration", f"resting for {self._rest_s:g} s", ""
+            if fusion.status != "flying":
+                return "waiting for a pose", "no star fix has placed it yet", ""
             return "float air", "", "float_on"
         if not mode.armed:
             if mode.source not in (GUARD_STARTED, "start_sequence"):

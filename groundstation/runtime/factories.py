@@ -25,9 +25,7 @@ from groundstation.nodes.node import Node
 from groundstation.nodes.reference_reader import ReferenceReader
 from groundstation.nodes.start_sequence import StartSequence
 from groundstation.nodes.valve_writer import ValveWriter
-from groundstation.runtime.rig import MockUpSection, Rig
-
-MOCK_UP_RADIUS_M = 0.2  # keep-in margin: goals keep the whole mock-up on the table
+from groundstation.runtime.rig import MOCK_UP_RADIUS_M, MockUpSection, Rig
 
 
 def _model(mock_up: MockUpSection) -> VehicleModel:
@@ -54,10 +52,10 @@ def _keep_in(rig: Rig) -> KeepIn:
 
 
 def command_mux(rig: Rig, vehicle: str) -> Node:
-    """The multiplexer of a vehicle, with a modulator of its own for braking."""
+    """The multiplexer of a vehicle, with modulators of its own for braking and for pushing by hand."""
     mock_up = rig.mock_up_of(vehicle)
-    model, modulator = _model(mock_up), _modulator(mock_up)
-    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), model, modulator, _keep_in(rig))
+    model, modulators = _model(mock_up), (_modulator(mock_up), _modulator(mock_up))
+    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), model, modulators, _keep_in(rig))
 
 
 def guard(rig: Rig, vehicle: str) -> Node:
@@ -74,7 +72,8 @@ def valve_writer(rig: Rig, vehicle: str) -> Node:
 def imu_reader(rig: Rig, vehicle: str) -> Node:
     """Parser, clock and scales of the IMU block."""
     imu = rig.mock_up_of(vehicle).imu
-    return ImuReader(vehicle, imu.protocol, imu.baud, imu.ftdi_latency_s, imu.averaging)
+    serial_number = rig.vehicles[vehicle].imu_serial_number
+    return ImuReader(vehicle, imu.protocol, imu.baud, imu.ftdi_latency_s, imu.averaging, serial_number)
 
 
 def fix_reader(rig: Rig, vehicle: str) -> Node:
@@ -109,7 +108,7 @@ def fusion(rig: Rig, vehicle: str) -> Node:
     sigma_xy_m = camera.sigma_xy_m if camera is not None else 0.001
     sigma_heading_rad = camera.sigma_heading_rad if camera is not None else math.radians(0.05)
     noise = NoiseModel(
-        packet_period_s=1.0 / imu.frame_rate_hz,
+        packet_period_s=imu.averaging * 1e-3,
         gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
         acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
         star_sigma_xy_m=sigma_xy_m,

@@ -9,20 +9,23 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import can
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from drivers.valve_bus.messages import MAX_VEHICLES
 from groundstation.control.registry import CONTROLLERS
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.runtime.errors import RigError
 
 LABORATORY = "laboratory:"
+MOCK_UP_RADIUS_M = 0.2  # a mock-up keeps this far from the edge of the table
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class TableSection(_Section):
@@ -32,6 +35,23 @@ class TableSection(_Section):
     x_max_m: float
     y_min_m: float
     y_max_m: float
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis, low, high in (("x", self.x_min_m, self.x_max_m), ("y", self.y_min_m, self.y_max_m)):
+            if high - low <= 2 * MOCK_UP_RADIUS_M:
+                raise ValueError(
+                    f"{axis}_min_m = {low:g} and {axis}_max_m = {high:g} leave no room for a mock-up"
+                )
+        return self
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a mock-up at this place is on the table as a whole."""
+        margin_m = MOCK_UP_RADIUS_M
+        return (
+            self.x_min_m + margin_m <= x_m <= self.x_max_m - margin_m
+            and self.y_min_m + margin_m <= y_m <= self.y_max_m - margin_m
+        )
 
 
 class ValvesSection(_Section):
@@ -48,15 +68,17 @@ class ValvesSection(_Section):
 
 
 class ImuSection(_Section):
-    """The IMU block: its port, its place and the white noise of its sensors as densities."""
+    """The IMU block: its line, its place and the white noise of its sensors as densities.
+
+    ``averaging`` is in polls of 1 kHz per frame: version 2 is asked for it, version 1 must have it.
+    """
 
     baud: Literal[115200, 250000] = 250000
     protocol: Literal["auto", "v1", "v2"] = "auto"
-    averaging: int | None = Field(default=None, ge=1, le=250)
+    averaging: int = Field(default=10, ge=1, le=250)
     ftdi_latency_s: NonNegative = 0.016
     position_body_m: tuple[float, float] = (0.0, 0.0)
     position_sigma_m: NonNegative = 0.001
-    frame_rate_hz: Positive = 100.0
     gyro_density_rad_s_rthz: Positive
     acc_density_m_s2_rthz: Positive
     gyro_tempco_rad_s_k: NonNegative = 0.00035
@@ -129,9 +151,9 @@ class VehicleSection(_Section):
     """One vehicle: its type, its place on the valve bus and where its devices are opened."""
 
     mock_up: str
-    bus_index: int = Field(ge=0, le=15)
+    bus_index: int = Field(ge=0, lt=MAX_VEHICLES)
     imu: str
-    imu_serial_number: int | None = Field(default=None, ge=0, le=65535)
+    imu_serial_number: int | None = Field(default=None, ge=0, le=0xFFFFFFFF)
     star_camera: str | None = None
     fixes: str | None = None
     reference: str | None = None
@@ -201,8 +223,18 @@ class Rig(_Section):
     laboratory: LaboratorySection | None = None
 
     @model_validator(mode="after")
+    def _known_interface(self) -> Self:
+        if isinstance(self.valve_bus, dict):
+            interface = self.valve_bus.get("interface")
+            if interface not in can.VALID_INTERFACES:
+                known = ", ".join(sorted(can.VALID_INTERFACES))
+                raise ValueError(f"valve_bus.interface: {interface!r} is none of python-can's: {known}")
+        return self
+
+    @model_validator(mode="after")
     def _consistent(self) -> Self:
         indices: dict[int, str] = {}
+        imus: dict[str, str] = {}
         for name, vehicle in self.vehicles.items():
             mock_up = self.mock_ups.get(vehicle.mock_up)
             if mock_up is None:
@@ -218,6 +250,16 @@ class Rig(_Section):
                 other = indices[vehicle.bus_index]
                 raise ValueError(f"vehicles.{name}.bus_index: {vehicle.bus_index} is already that of {other}")
             indices[vehicle.bus_index] = name
+            if vehicle.imu in imus:
+                raise ValueError(
+                    f"vehicles.{name}.imu: {vehicle.imu!r} is already that of {imus[vehicle.imu]}"
+                )
+            imus[vehicle.imu] = name
+            if not self.table.holds(vehicle.hold.x_m, vehicle.hold.y_m):
+                raise ValueError(
+                    f"vehicles.{name}.hold: ({vehicle.hold.x_m:g}, {vehicle.hold.y_m:g}) m is nearer than "
+                    f"{MOCK_UP_RADIUS_M:g} m to the table's edge, or beyond it"
+                )
             addresses = {"imu": vehicle.imu, "star_camera": vehicle.star_camera, "fixes": vehicle.fixes}
             for key, address in addresses.items():
                 if address is not None and address.startswith(LABORATORY) and self.laboratory is None:
@@ -260,15 +302,17 @@ def parse_rig(text: str, path: Path) -> Rig:
 
 
 def _first_sentence(error: ValidationError) -> str:
-    first = error.errors()[0]
+    found = error.errors()
+    typos = [each for each in found if each["type"] == "extra_forbidden"]
+    first = (typos or found)[0]  # a typo in a required key is also a missing key: the typo says more
     where = ".".join(str(part) for part in first["loc"] if part != "[key]")
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         return f"'{where}' is no known key (a typo?)"
     if first["type"] == "missing":
         return f"'{where}' is missing"
-    found = "" if first["type"] == "value_error" else f", found {first['input']!r}"
-    return f"{where + ': ' if where else ''}{message}{found}"
+    value = "" if first["type"] == "value_error" else f", found {first['input']!r}"
+    return f"{where + ': ' if where else ''}{message}{value}"
 
 
 def _anchor(rig: Rig, folder: Path) -> Rig:

@@ -22,7 +22,6 @@ table = { x_min_m = -2.0, x_max_m = 2.0, y_min_m = -1.5, y_max_m = 1.5 }
 [mock_ups.standard.imu]
 baud = 250000
 ftdi_latency_s = 0.001
-frame_rate_hz = 100.0
 position_body_m = [0.03151, -0.02122]
 gyro_density_rad_s_rthz = 6.7e-5
 acc_density_m_s2_rthz = 6.5e-5

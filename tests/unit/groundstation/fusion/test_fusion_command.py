@@ -103,7 +103,7 @@ def test_a_wrong_key_is_named(folder, tmp_path, key, value):
 
 
 def test_meta_that_is_no_json_is_refused_with_its_line(folder, tmp_path):
-    (folder / "meta.json").write_text('{"known": {\n "a": 1,\n}')
+    (folder / "meta.json").write_text('{"known": {\n "a": 1,\n "b": ?}}')
     assert "line 3" in refusal(folder, "--out", tmp_path / "e.csv")
 
 
