@@ -51,6 +51,8 @@ class Laboratory:
     hole_rate_hz: float = 0.2
     knock_m_s2: float = 0.02
     """Of one poll in the three milliseconds after a valve switches."""
+    gyro_warm_up_rad_s: float = 0.0
+    """How far the gyro's null creeps after switching on, over some minutes."""
     outage_s: tuple[float, float] | None = None
     table_seed: int | None = None
     """The same table under other noise, for maps."""
@@ -263,6 +265,7 @@ def make(lab: Laboratory) -> DataSet:
     tempco = np.array([3.5e-4, 3e-4, 3e-4]) * rng.normal(1.0, 0.4, 3)
     switch_on = rng.normal(0.0, 1.0, 3) * np.array([math.radians(0.3), 0.05, 0.05])
     bias[:] = switch_on + warm[:, None] * tempco + np.cumsum(rng.normal(0.0, 1.0, (n, 3)) * walk, axis=0)
+    bias[:, 0] += lab.gyro_warm_up_rad_s * (1.0 - np.exp(-t / 120.0))
     knock = rng.normal(0.0, lab.knock_m_s2, (n, 2)) * truth["knocks"][:, None]
     omega_read = scale * mid_omega + bias[:, 0]
     ax_read = (1 + skew[0, 0]) * fx + skew[0, 1] * fy + bias[:, 1] + knock[:, 0]

@@ -14,6 +14,7 @@ import numpy as np
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
+from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.noise import NoiseModel
@@ -65,6 +66,7 @@ class ErrorStateFilter:
         self._candidates: list[Fix] = []
         self._rests: list[tuple[float, float]] = []
         self._refused: list[tuple[float, Array]] = []
+        self._creep = CreepWatch()
         self._waiting: list[Fix] = []
         self._accounts: list[FixAccount] = []
 
@@ -154,9 +156,11 @@ class ErrorStateFilter:
         nis = float(z @ weight @ z)
         if nis > self.noise.gate_nis:
             return self._contradicted(fix, t, z, nis)
+        creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - reckoner.checkpoint_s)
         K = P @ H.T @ weight
         x += K @ z
         P -= K @ S @ K.T
+        P[es.GYRO_BIAS, es.GYRO_BIAS] += creeping
         reckoner.is_lost = False
         if self._trace is not None:
             self._trace.chains[-1].steps += [*steps, Corrected(H, K, weight, z)]
@@ -254,6 +258,7 @@ class ErrorStateFilter:
         measurements.take_pose(fix, x, P, float(x[es.THETA]), REOPENED_VELOCITY_M_S)
         self._begin_chain(t, x, P)
         self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
+        self._creep.forget()
         self.counters.add("fix_starts_the_estimate_again")
         return FixAccount(
             fix.t_exposure_ns, True, "starts the estimate again", float(z[0]), float(z[1]), float(z[2]), nis
