@@ -83,6 +83,22 @@ class JournalWriter:
         return tuple(self._names), packed
 
 
+class NoJournal(JournalWriter):
+    """Keeps nothing: for runs that nobody records, such as campaigns."""
+
+    def note(
+        self,
+        kind: Kind,
+        node: str | None,
+        topic: int,
+        owner: str,
+        sequence: int,
+        now_ns: int,
+        wall_ns: int = 0,
+    ) -> None:
+        """Forget."""
+
+
 def read_entries(data: bytes) -> NDArray[np.void]:
     """Entries of one ``Journal`` payload, shape (n,), dtype ``ENTRY``."""
     return np.frombuffer(data, dtype=ENTRY)

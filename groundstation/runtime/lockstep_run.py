@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from drivers.errors import NotFound
 from drivers.laboratory import load_laboratory
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.journal import JournalWriter
+from groundstation.bus.journal import JournalWriter, NoJournal
 from groundstation.bus.topics import topic_of
 from groundstation.messages.definitions import Latency
 from groundstation.recording.errors import RecordingError
@@ -27,7 +27,7 @@ LATENCY_PERIOD_NS = 1_000_000_000
 DEFAULT_SEED = 1
 
 
-def make_runner(rig: Rig, seed: int, observers: list[Observer]) -> LockstepRunner:
+def make_runner(rig: Rig, seed: int, observers: list[Observer], *, journaled: bool = True) -> LockstepRunner:
     """Build everything that a rig names, on one thread and in virtual time.
 
     Raises:
@@ -35,7 +35,7 @@ def make_runner(rig: Rig, seed: int, observers: list[Observer]) -> LockstepRunne
     """
     if rig.laboratory is None:
         raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
-    journal, sequences = JournalWriter(), Sequences()
+    journal, sequences = JournalWriter() if journaled else NoJournal(), Sequences()
     try:
         laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
         slots = build_slots(rig, None, journal, sequences, measure=False)

@@ -1,4 +1,4 @@
-"""Seconds of flight per second of CPU in lockstep, as the command flies: with recording and ledger."""
+"""Seconds of flight per second of CPU in lockstep: nodes, runner and emulator, with and without recording."""
 
 from bench.rows import RIGS, Bench, CpuTime, Row
 from groundstation.runtime.lockstep_run import make_runner, run_lockstep
@@ -9,38 +9,37 @@ CASES = (
     ("rendered sky, tracker busy 0.6 s", "published.toml", 40.0, 5.0),
     ("rendered sky, all 15 frames/s solved", "late_pipeline.toml", 40.0, 5.0),
 )
-"""What, rig of one mock-up, virtual seconds, times real time."""
+"""What, rig of one mock-up, virtual seconds, times real time (nothing recorded, as in campaigns)."""
 
 
 def measure(bench: Bench) -> list[Row]:
-    """One row per case."""
+    """Two rows per case: as campaigns fly, which the limit is for, and with recording and ledger."""
     rows = []
     for what, name, flown_s, limit in CASES:
-        rig = RIGS / name
-        loaded = load_rig(rig)
-        path = bench.folder / f"speed_{rig.stem}.mcap"
-
-        def progress(text: str, done: float, what: str = what) -> None:
-            del done
-            bench.say(f"lockstep, {what}: {text}")
-
+        loaded = load_rig(RIGS / name)
+        title = f"lockstep, one mock-up, {what}"
+        bench.say(title)
         with CpuTime() as cpu:
-            run_lockstep(loaded, rig, path, flown_s, 1, progress)
+            runner = make_runner(loaded, 1, [], journaled=False)
+            runner.run(round(flown_s * 1e9))
+            runner.close()
         times = flown_s / cpu.seconds
         measured = f"{times:.1f}x ({bench.in_units(cpu.seconds / flown_s)} per second flown)"
-        rows.append(
-            Row(f"lockstep, one mock-up, {what}", f"{limit:.0f}x real time", measured, times >= limit)
-        )
-    return [*rows, _unrecorded(bench)]
+        rows.append(Row(title, f"{limit:.0f}x real time", measured, times >= limit))
+        rows.append(_recorded(bench, title, name, flown_s))
+    return rows
 
 
-def _unrecorded(bench: Bench) -> Row:
-    """What is left without observers: nodes, runner and emulator."""
-    what, name, flown_s, _ = CASES[0]
-    bench.say(f"lockstep, {what}, nothing recorded")
+def _recorded(bench: Bench, title: str, name: str, flown_s: float) -> Row:
+    """The same as the command flies it: every topic into a file, and the ledger."""
+    rig = RIGS / name
+    path = bench.folder / f"speed_{rig.stem}.mcap"
+
+    def progress(text: str, done: float) -> None:
+        del done
+        bench.say(f"{title}, recorded: {text}")
+
     with CpuTime() as cpu:
-        runner = make_runner(load_rig(RIGS / name), 1, [])
-        runner.run(round(flown_s * 1e9))
-        runner.close()
+        run_lockstep(load_rig(rig), rig, path, flown_s, 1, progress)
     measured = f"{flown_s / cpu.seconds:.1f}x ({bench.in_units(cpu.seconds / flown_s)} per second flown)"
-    return Row(f"lockstep, one mock-up, {what}, nothing recorded", "", measured, None)
+    return Row(f"{title}, recorded", "", measured, None)
