@@ -14,6 +14,7 @@ import numpy as np
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
+from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
@@ -35,9 +36,6 @@ CANDIDATE_AGE_S = 5.0
 """A first fix is compared with those up to this long after it."""
 MAX_PLAUSIBLE = 1e3
 """No table is a kilometre wide, and no fix's heading is that many radians."""
-MAX_SPEED_M_S = 0.2
-"""Nothing on a table flies faster; bounds what two first fixes may differ by."""
-AGREEMENT_SIGMAS = 6.0
 
 
 class ErrorStateFilter:
@@ -177,22 +175,11 @@ class ErrorStateFilter:
         self._refused.append((t, z))
         if len(self._refused) >= self.noise.reopen_after:
             self._reckoner.is_lost = True
-            if self._refused_agree():
+            if innovations_agree(self._refused[-self.noise.reopen_after :], self.noise):
                 return self._restart(fix, t, z, nis)
         return FixAccount(
             fix.t_exposure_ns, False, "outside the gate", float(z[0]), float(z[1]), float(z[2]), nis
         )
-
-    def _refused_agree(self) -> bool:
-        """Whether the last refused innovations lie on a straight line in time, as a lost filter's would."""
-        last = self._refused[-self.noise.reopen_after :]
-        t = np.array([r[0] - last[0][0] for r in last])
-        z = np.array([r[1] for r in last])
-        z[:, 2] = np.unwrap(z[:, 2])
-        line = np.polynomial.polynomial.polyfit(t, z, 1)
-        left = np.abs(z - line[0] - np.outer(t, line[1]))
-        sigma = np.array([self.noise.star_sigma_xy_m] * 2 + [self.noise.star_sigma_heading_rad])
-        return bool((left < 6.0 * sigma + 0.02 * np.abs(z).max(axis=0)).all())
 
     def _consider(self, fix: Fix, t: float) -> FixAccount:
         """Start from the first two fixes that agree; one alone may be wrong."""
@@ -220,20 +207,12 @@ class ErrorStateFilter:
         a, b = self._seconds(first.t_exposure_ns), self._seconds(second.t_exposure_ns)
         if not 0.0 < b - a < CANDIDATE_AGE_S:
             return False
-        sigma = np.sqrt(np.diag(first.cov) + np.diag(second.cov))
-        slack = AGREEMENT_SIGMAS * sigma
-        turned = 0.0
-        if self._rest_of(a) is None or self._rest_of(b) is None:
-            segment = self._reckoner.history.between(a, b)
-            turned = float(((segment.omega_rad_s - self.x[es.GYRO_BIAS]) * segment.span_s).sum())
-            slack[:2] += MAX_SPEED_M_S * (b - a)
-            slack[2] += 3.0 * math.sqrt(self.P[es.GYRO_BIAS, es.GYRO_BIAS]) * (b - a)
-        off = [
-            second.x_m - first.x_m,
-            second.y_m - first.y_m,
-            math.remainder(second.heading_rad - first.heading_rad - turned, math.tau),
-        ]
-        return bool((np.abs(off) < slack).all())
+        if self._rest_of(a) is not None and self._rest_of(b) is not None:
+            return fixes_agree(first, second, Between(0.0, 0.0, 0.0))
+        segment = self._reckoner.history.between(a, b)
+        turned = float(((segment.omega_rad_s - self.x[es.GYRO_BIAS]) * segment.span_s).sum())
+        null_sigma = math.sqrt(self.P[es.GYRO_BIAS, es.GYRO_BIAS])
+        return fixes_agree(first, second, Between(b - a, turned, null_sigma))
 
     def _rest_of(self, t: float) -> tuple[float, float] | None:
         return next((rest for rest in self._rests if rest[0] <= t <= rest[1]), None)
