@@ -24,20 +24,20 @@ def astroalign(
         library = importlib.import_module("astroalign")
     except ImportError:
         return None
-    target = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
+    target = np.stack((catalogue.x_m, catalogue.y_m), axis=1) / rays.scale_m_px  # its tolerance is in px
     times, errors = [], []
     for frame in frames:
         begin = time.process_time()
         spots = detect(frame.image)
         q = rays.look_up(spots.u_px, spots.v_px).q_body_m
-        source = np.stack((q.real, q.imag), axis=1)
+        source = np.stack((q.real, q.imag), axis=1) / rays.scale_m_px
         try:
             found, _ = library.find_transform(source, target, max_control_points=200)
         except library.MaxIterError:
             found = None
         times.append(1e3 * (time.process_time() - begin))
         if found is not None:
-            origin = found.params[:2, 2]
+            origin = rays.scale_m_px * found.params[:2, 2]
             errors.append(1e3 * np.hypot(*(origin - frame.pose[:2])))
     good = [e for e in errors if e < 20.0]
     return float(np.median(times)), float(np.sqrt(np.mean(np.square(good)))) if good else np.nan, len(good)
