@@ -9,9 +9,9 @@ import numpy as np
 from bench_star_laboratory import Frame
 
 from calibration.camera import CameraCalibration, StarCatalogue
+from calibration.camera.survey.overlap import rigid_fit
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.rays import CeilingRays, ceiling_points
-from groundstation.star_tracking.sweep import rigid_fit
 
 _SQUARE_M, _PITCH_M = 0.15, 0.6
 

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import sys
 import time
 from collections.abc import Callable, Sequence
 from enum import StrEnum
@@ -31,7 +32,7 @@ from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.sky_adjustment import HEIGHT
-from groundstation.star_tracking.survey import LENS, SurveyedSky, SurveyError
+from groundstation.star_tracking.survey import LENS, Anchor, SurveyedSky, SurveyError
 from groundstation.star_tracking.survey import survey as survey_sky
 from groundstation.star_tracking.tracker import StarTracker
 
@@ -146,6 +147,7 @@ def survey(
         sky = survey_sky(pictures, anchors, camera, tape_std_m=tape_std_m, free=free)
     except SurveyError as error:
         raise UsageError(f"{folder}: {error}.") from error
+    _warn_of_parts(folder, sky, anchors, [path.stem for path in frames])
     lines = ["id,x_m,y_m,std_x_m,std_y_m,times_seen"]
     for name, at, std, seen in zip(sky.ids, sky.star_m, sky.std_m, sky.times_seen, strict=True):
         lines.append(f"{name},{at[0]:.6f},{at[1]:.6f},{std[0]:.2e},{std[1]:.2e},{seen}")
@@ -162,6 +164,20 @@ def survey(
         f"tape against pictures {tape_mm:.2f} mm, "
         f"ceiling {sky.camera.ceiling_height_above_camera_m:.4f} m above the camera."
     )
+
+
+def _warn_of_parts(folder: Path, sky: SurveyedSky, anchors: Sequence[Anchor], frames: Sequence[str]) -> None:
+    """Say which pictures and anchors hang on no picture of the surveyed part."""
+    left_out = sorted(set(range(len(frames))) - set(sky.placed.tolist()))
+    if len(sky.part_sizes) > 1:
+        names = ", ".join(frames[i] for i in left_out[:8]) + (", ..." if len(left_out) > 8 else "")
+        sys.stderr.write(
+            f"{folder}: the sweep has gaps; {len(left_out)} pictures do not overlap the surveyed part "
+            f"and were left out ({names}).\n"
+        )
+    for anchor in anchors:
+        if anchor.name not in sky.anchors:
+            sys.stderr.write(f"{folder}: anchor '{anchor.name}' lies outside the surveyed part, unused.\n")
 
 
 def _verify(sky: SurveyedSky, pictures: Sequence[Spots], held: set[int]) -> None:

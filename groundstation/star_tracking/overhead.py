@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.camera.survey.overlap import rigid_fit
 from groundstation.star_tracking.rays import undistort
-from groundstation.star_tracking.sweep import rigid_fit
 
 Array = NDArray[np.float64]
 

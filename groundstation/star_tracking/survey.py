@@ -12,53 +12,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.camera.models import CameraCalibration
+from calibration.camera.survey.linking import LinkedMap
+from calibration.camera.survey.tape import TapeError, fit_tape
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.sky_adjustment import (
     CENTRE,
     DISTORTION,
     HEIGHT,
+    TILT,
     Adjusted,
     Observations,
     StarPrior,
     adjust,
+    project,
 )
-from groundstation.star_tracking.sweep import Sweep, string_together
+from groundstation.star_tracking.sweep_parts import (
+    MIN_TIMES_SEEN,
+    Anchor,
+    SurveyError,
+    link_pictures,
+    only_stars,
+    part_with_anchors,
+)
+
+__all__ = ["LENS", "Anchor", "SurveyError", "SurveyedSky", "shape_std_m", "survey"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-LENS = (*HEIGHT, "fy", *CENTRE, *DISTORTION)
-"""Height and lens; fx is held, because a level camera's picture scales with both alike."""
+LENS = (*HEIGHT, *TILT, "fy", *CENTRE, *DISTORTION)
+"""Height, tilt of the mount and lens; fx is held: a level camera's picture scales with both alike."""
 
-_CLICK_REACH_PX = 12.0
-_MIN_TIMES_SEEN = 2
+_LENS_ROUNDS = 3  # a wrong lens tears stars apart near the corners: link again with the better one
+_MIN_SEEN_RATIO = 0.2  # of the pictures that should show a star; stray lights coincide by chance
+_EDGE_PX = 12.0  # a star so near the edge of the picture need not be seen
 _CENTRE_FLOOR_PX = 0.01
-
-
-class SurveyError(ValueError):
-    """The sweep or its anchors do not give a catalogue; the message is one sentence."""
-
-
-@dataclass(frozen=True, slots=True)
-class Anchor:
-    """A star measured by tape, and where it was clicked.
-
-    Attributes:
-        name: Its id.
-        x_m: By tape, table.
-        y_m: By tape, table.
-        frame: Index of the picture of the click.
-        u_px: Of the click.
-        v_px: Of the click.
-    """
-
-    name: str
-    x_m: float
-    y_m: float
-    frame: int
-    u_px: float
-    v_px: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +63,9 @@ class SurveyedSky:
         std_height_m: One sigma of that height, the tape's errors not included.
         pose: Poses of the placed pictures, shape (f, 3).
         placed: Their indices, shape (f,).
-        tape_residual_m: Anchor by tape minus as surveyed, shape (a, 2).
+        part_sizes: Pictures of each part into which the sweep fell, the largest first; one number if it held.
+        anchors: Names of the anchors that lie in the part that was surveyed.
+        tape_residual_m: These anchors by tape minus as surveyed, shape (a, 2).
         adjusted: The adjustment behind it.
     """
 
@@ -86,6 +77,8 @@ class SurveyedSky:
     std_height_m: float
     pose: Array
     placed: Index
+    part_sizes: tuple[int, ...]
+    anchors: tuple[str, ...]
     tape_residual_m: Array
     adjusted: Adjusted
 
@@ -114,21 +107,34 @@ def survey(
     """
     if len(anchors) < 2:
         raise SurveyError(f"a survey needs at least two anchors, there is {len(anchors)}")
-    rays = CeilingRays(camera)
-    points = [rays.look_up(p.u_px, p.v_px).q_body_m for p in pictures]
-    try:
-        sweep = _without_rare_stars(string_together(points))
-    except ValueError as error:
-        raise SurveyError(str(error)) from error
-    named = np.array([_clicked(anchor, pictures, sweep) for anchor in anchors], dtype=np.int64)
-    if len(set(named.tolist())) < len(anchors):
-        raise SurveyError("two anchors were clicked on one star")
+    sky = _survey_once(pictures, anchors, camera, tape_std_m, free, progress)
+    for _ in range(1, 1 if tuple(free) == HEIGHT else _LENS_ROUNDS):
+        sky = _survey_once(pictures, anchors, sky.camera, tape_std_m, free, progress)
+    return sky
+
+
+def _survey_once(
+    pictures: Sequence[Spots],
+    anchors: Sequence[Anchor],
+    camera: CameraCalibration,
+    tape_std_m: float,
+    free: Sequence[str],
+    progress: Callable[[int, float], None] | None,
+) -> SurveyedSky:
+    """Link, anchor and adjust with a camera as far as it is known."""
+    parts = link_pictures(pictures, CeilingRays(camera))
+    sweep, anchors, named = part_with_anchors(parts, anchors, pictures)
     tape = np.array([[a.x_m, a.y_m] for a in anchors])
-    scale_turn, shift = _similarity(sweep.star_m[named], tape[:, 0] + 1j * tape[:, 1])
-    star = scale_turn * sweep.star_m + shift
-    origin = scale_turn * (sweep.pose[:, 0] + 1j * sweep.pose[:, 1]) + shift
-    pose = np.stack((origin.real, origin.imag, sweep.pose[:, 2] + np.angle(scale_turn)), axis=1)
-    guess = camera.with_height(camera.ceiling_height_above_camera_m * abs(scale_turn))
+    try:
+        fit = fit_tape(
+            [a.name for a in anchors], sweep.star_m[named], tape[:, 0] + 1j * tape[:, 1], tape_std_m
+        )
+    except TapeError as error:
+        raise SurveyError(str(error)) from error
+    star = fit.factor * sweep.star_m + fit.shift_m
+    origin = fit.factor * (sweep.pose[:, 0] + 1j * sweep.pose[:, 1]) + fit.shift_m
+    pose = np.stack((origin.real, origin.imag, sweep.pose[:, 2] + np.angle(fit.factor)), axis=1)
+    guess = camera.with_height(camera.ceiling_height_above_camera_m * abs(fit.factor))
     position = np.stack((star.real, star.imag), axis=1)
     # A lens far off must not be adjusted together with rough poses: these come first.
     stages = [HEIGHT] if tuple(free) == HEIGHT else [HEIGHT, tuple(free)]
@@ -142,7 +148,9 @@ def survey(
         except ValueError as error:
             raise SurveyError(str(error)) from error
         times_seen = np.bincount(sweep.star[adjusted.used], minlength=len(position))
-        real = times_seen >= _MIN_TIMES_SEEN
+        expected = _times_expected(adjusted)
+        real = times_seen >= np.maximum(MIN_TIMES_SEEN, _MIN_SEEN_RATIO * expected)
+        real[named] |= times_seen[named] >= MIN_TIMES_SEEN
         if not real[named].all():
             raise SurveyError("an anchor's star does not fit the other pictures")
         if real.all():
@@ -150,7 +158,7 @@ def survey(
         # Stray lights that happened to fall near each other: out they go, and once more.
         named = (np.cumsum(real) - 1)[named]
         position = position[real]
-        sweep = _only_stars(sweep, real)
+        sweep = only_stars(sweep, real)
     return SurveyedSky(
         ids=_ids(anchors, named, len(position)),
         star_m=adjusted.star_m,
@@ -160,6 +168,8 @@ def survey(
         std_height_m=adjusted.std_camera.get(HEIGHT[0], 0.0),
         pose=adjusted.pose,
         placed=sweep.placed,
+        part_sizes=tuple(len(part.placed) for part in parts),
+        anchors=tuple(anchor.name for anchor in anchors),
         tape_residual_m=tape - adjusted.star_m[named],
         adjusted=adjusted,
     )
@@ -183,56 +193,21 @@ def shape_std_m(star_m: Array, cov_m2: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.diag(inner), 0.0)).reshape(n, 2))
 
 
-def _clicked(anchor: Anchor, pictures: Sequence[Spots], sweep: Sweep) -> int:
-    where = np.flatnonzero(sweep.placed == anchor.frame)
-    if len(where) == 0:
-        raise SurveyError(
-            f"anchor '{anchor.name}': its picture could not be laid on the others, click it in another one"
-        )
-    spots = pictures[anchor.frame]
-    row = np.flatnonzero(sweep.frame == where[0])
-    spot = sweep.spot[row]
-    distance = np.hypot(spots.u_px[spot] - anchor.u_px, spots.v_px[spot] - anchor.v_px)
-    if len(distance) == 0 or distance.min() > _CLICK_REACH_PX:
-        raise SurveyError(
-            f"anchor '{anchor.name}': no star within {_CLICK_REACH_PX:.0f} px of the click "
-            f"({anchor.u_px:.1f}, {anchor.v_px:.1f})"
-        )
-    return int(sweep.star[row[int(np.argmin(distance))]])
+def _times_expected(adjusted: Adjusted) -> Index:
+    """Count the pictures inside which each star should have been seen, shape (s,)."""
+    camera = adjusted.camera
+    count = np.zeros(len(adjusted.star_m), dtype=np.int64)
+    for pose in adjusted.pose:
+        pixel, _ = project(camera, np.broadcast_to(pose, (len(count), 3)), adjusted.star_m)
+        # Far outside, a polynomial distortion folds back into the picture: judge by distance first.
+        near = np.hypot(*(adjusted.star_m - pose[:2]).T) < camera.ceiling_height_above_camera_m
+        inside = (pixel > _EDGE_PX).all(axis=1)
+        inside &= (pixel < np.array([camera.width, camera.height]) - 1.0 - _EDGE_PX).all(axis=1)
+        count += near & inside
+    return count
 
 
-def _similarity(source: NDArray[np.complex128], goal: NDArray[np.complex128]) -> tuple[complex, complex]:
-    centred = source - source.mean()
-    spread = float((np.abs(centred) ** 2).sum())
-    if spread < 1e-6:
-        raise SurveyError("the anchors are all in one place")
-    factor = complex(((goal - goal.mean()) * np.conj(centred)).sum() / spread)
-    return factor, complex(goal.mean() - factor * source.mean())
-
-
-def _without_rare_stars(sweep: Sweep) -> Sweep:
-    """Drop what was seen too rarely to be a star."""
-    seen = np.bincount(sweep.star, minlength=len(sweep.star_m))
-    keep = seen >= _MIN_TIMES_SEEN
-    if not keep.any():
-        raise SurveyError("no star was seen in two pictures")
-    return _only_stars(sweep, keep)
-
-
-def _only_stars(sweep: Sweep, keep: NDArray[np.bool_]) -> Sweep:
-    number = np.cumsum(keep) - 1
-    kept = keep[sweep.star]
-    return Sweep(
-        sweep.pose,
-        sweep.placed,
-        sweep.star_m[keep],
-        sweep.frame[kept],
-        sweep.spot[kept],
-        number[sweep.star[kept]],
-    )
-
-
-def _observations(pictures: Sequence[Spots], sweep: Sweep) -> Observations:
+def _observations(pictures: Sequence[Spots], sweep: LinkedMap) -> Observations:
     pixel = np.empty((len(sweep.frame), 2))
     sigma = np.empty(len(sweep.frame))
     for row, number in enumerate(sweep.placed):
