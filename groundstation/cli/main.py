@@ -1,15 +1,14 @@
 """The ``groundstation`` command: one row per sub-command, imported only when it is called."""
 
+from __future__ import annotations
+
 import importlib
+import os
 import sys
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import typer
-
-from calibration.camera.errors import CalibrationFileError
-from drivers.errors import DeviceError
-from groundstation.recording.errors import RecordingError
-from groundstation.runtime.errors import GroundStationError, UsageError
+if TYPE_CHECKING:
+    import typer
 
 
 class Command(NamedTuple):
@@ -42,6 +41,8 @@ def build(called: str | None) -> typer.Typer:
     Args:
         called: Name of the sub-command, None or unknown for the overview.
     """
+    import typer  # here, so that Ctrl-C is understood before anything heavy is loaded
+
     app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
     @app.callback()
@@ -74,17 +75,38 @@ def _not_called() -> None:
     """Stand in for a command in the overview."""
 
 
-def main() -> None:
-    """Entry point: every error of ours is one sentence and exit code 2."""
-    words = sys.argv[1:]
+def call(words: list[str]) -> int:
+    """Run the command line; every error of ours is one sentence. Returns the exit code."""
+    from calibration.camera.errors import CalibrationFileError
+    from drivers.errors import DeviceError
+    from groundstation.recording.errors import RecordingError
+    from groundstation.runtime.errors import GroundStationError, UsageError
+
     try:
-        build(words[0] if words else None)()
+        build(words[0] if words else None)(words)
+    except SystemExit as done:
+        return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
-        raise SystemExit(2) from None
+        return 2
     except GroundStationError as error:
         sys.stderr.write(f"groundstation: {error}\n")
-        raise SystemExit(1) from None
+        return 1
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    words = sys.argv[1:]
+    try:
+        code = call(words)
+    except KeyboardInterrupt:  # before a command took the signal over: nothing had been started yet
+        code = 0 if words[:1] == ["run"] else 130
+    if "zenoh" in sys.modules:  # all sessions are closed; its threads would take seconds to wind down
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    raise SystemExit(code)
 
 
 if __name__ == "__main__":

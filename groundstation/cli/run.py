@@ -43,11 +43,12 @@ def run(
     ] = False,
     seed: Annotated[int | None, typer.Option(help="Of the emulated laboratory, in lockstep.")] = None,
 ) -> None:
-    """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
+    r"""Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
 
-    Examples:
+    For example:
+
+    \b
       groundstation run examples/rigs/two_mock_ups.toml
-
       groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
     loaded = load_rig(rig)

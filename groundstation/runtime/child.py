@@ -26,6 +26,7 @@ class Child:
 
     Attributes:
         is_ready: It has said so, and not gone since.
+        has_been_ready: It has said so once, in this life or an earlier one.
         restarts: How often it was started again.
         restart_at_s: When it is to be started again; None while it runs.
         last_heard_s: Its last sign of life, 0 before the first.
@@ -37,6 +38,7 @@ class Child:
     def __init__(self, name: str) -> None:
         self.name = name
         self.is_ready = False
+        self.has_been_ready = False
         self.restarts = 0
         self.restart_at_s: float | None = None
         self.last_heard_s = 0.0

@@ -120,6 +120,7 @@ def fusion(rig: Rig, vehicle: str) -> Node:
         acc_tempco_m_s2_c=imu.acc_tempco_m_s2_k,
         gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
         acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
+        fix_delay_sigma_s=camera.delay_sigma_s if camera is not None else 0.0,
     )
     method = mock_up.fusion.method
     external = rig.vehicles[vehicle].fixes is not None  # its covariance is the whole truth

@@ -26,6 +26,7 @@ LABORATORY = "laboratory"
 COMMANDS = "commands"
 START_S = 30.0
 """A process that is not ready by then never will be."""
+HOPELESS = 4  # restarts of a process that was never ready
 HUNG_S = 4.0
 """Processes give a sign of life ten times a second; the recorder, once."""
 STOP_COMMANDS_S, STOP_NODES_S, STOP_ALL_S = 0.7, 1.5, 2.2
@@ -112,6 +113,7 @@ class Launcher:
             known = self._children.get(name)
             if known is not None:
                 known.is_ready = alive
+                known.has_been_ready |= alive
         for child in self.children:
             while not child.complaints.empty():
                 self._say(f"{child.name}: {child.complaints.get()}")
@@ -172,6 +174,10 @@ class Launcher:
                 self._start(child)
         elif child.has_ended:
             how = child.how_it_ended()
+            if child.restarts >= HOPELESS and not child.has_been_ready:
+                raise GroundStationError(
+                    f"{child.name} was started {child.restarts + 1} times in vain: it {how}"
+                )
             self._say(f"{child.name} {how}; starting it again in {child.back_off(now_s):.2g} s")
         elif child.last_heard_s and now_s - child.last_heard_s > HUNG_S:
             self._say(f"{child.name} hangs: no sign of life for {HUNG_S:g} s, killing it")

@@ -20,7 +20,7 @@ from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.runtime.child import REFUSAL
-from groundstation.runtime.errors import UsageError
+from groundstation.runtime.errors import RigError, UsageError
 from groundstation.runtime.live import LiveProcess
 from groundstation.runtime.node_table import build_slots
 from groundstation.runtime.plan import resolved_ports
@@ -102,7 +102,10 @@ def run(orders: Orders) -> None:
     """Build the nodes of the process and run them until told to stop."""
     rig = parse_rig(orders.rig_text, Path(orders.rig))
     journal, sequences = JournalWriter(), Sequences(orders.sequences_after)
-    slots = build_slots(rig, orders.process, journal, sequences)
+    try:
+        slots = build_slots(rig, orders.process, journal, sequences)
+    except ValueError as error:  # a number that no check of the rig file knows of, but some node does
+        raise RigError(f"{orders.rig}: {error}") from error
     ports = [port for port in resolved_ports(rig, orders.addresses) if port.process == orders.process]
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.collect()
