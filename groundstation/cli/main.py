@@ -83,7 +83,7 @@ def call(words: list[str]) -> int:
     from groundstation.runtime.errors import GroundStationError, UsageError
 
     try:
-        build(words[0] if words else None)(words)
+        build(words[0] if words else None)(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from groundstation.cli.main import main
+from groundstation.cli.main import call
 from groundstation.runtime.running import RunningRig, find_running
 
 
@@ -17,11 +17,8 @@ def own_folder(tmp_path, monkeypatch):
     return tmp_path / "groundstation"
 
 
-def refused(capsys, monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["groundstation", "request", *words])
-    with pytest.raises(SystemExit) as ending:
-        main()
-    assert ending.value.code == 2
+def refused(capsys, *words):
+    assert call(["request", *words]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
@@ -38,15 +35,15 @@ def refused(capsys, monkeypatch, *words):
         (["alpha", "stop", "--pid", "1"], "no rig is running with process 1"),
     ],
 )
-def test_what_cannot_be_asked_is_refused(words, reason, capsys, monkeypatch):
-    assert reason in refused(capsys, monkeypatch, *words)
+def test_what_cannot_be_asked_is_refused(words, reason, capsys):
+    assert reason in refused(capsys, *words)
 
 
-def test_the_vehicle_must_be_flown_by_exactly_one_run(capsys, monkeypatch):
+def test_the_vehicle_must_be_flown_by_exactly_one_run(capsys):
     RunningRig(os.getpid(), "one", "tcp/127.0.0.1:1", ("alpha", "beta")).announce()
     RunningRig(os.getppid(), "other", "tcp/127.0.0.1:2", ("alpha",)).announce()
-    assert "no vehicle 'gamma' is running" in refused(capsys, monkeypatch, "gamma", "stop")
-    assert "choose one with --pid" in refused(capsys, monkeypatch, "alpha", "stop")
+    assert "no vehicle 'gamma' is running" in refused(capsys, "gamma", "stop")
+    assert "choose one with --pid" in refused(capsys, "alpha", "stop")
 
 
 def test_a_run_is_found_while_it_lives_and_forgotten_after(own_folder):
