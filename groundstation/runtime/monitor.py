@@ -196,7 +196,8 @@ class Monitor:
             seen = int(counters["bytes_seen"])
             line.bytes_seen, line.grows = seen, seen > line.bytes_seen
         said = payload.summary.partition(_SOON_AGAIN)[0]
-        if said and (before is None or before.summary.partition(_SOON_AGAIN)[0] != said):
+        is_news = before is None or before.summary.partition(_SOON_AGAIN)[0] != said
+        if said and (is_news or (is_port and payload.level == 0)):  # an opened port is always news
             self.say(payload.summary)
 
     @staticmethod
