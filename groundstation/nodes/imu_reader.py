@@ -31,6 +31,7 @@ class ImuReader(Node):
         averaging: Polls per frame. Version 2 says its own and is asked for this one if it differs;
             version 1 does not say, so this is what it is taken to have.
         serial_number: Of the block that belongs here, None if any may; version 1 cannot be asked.
+        temperature_c: By an operator or another probe, for a block that sends none; NaN if unknown.
     """
 
     inputs = (ImuBytes,)
@@ -44,6 +45,7 @@ class ImuReader(Node):
         latency_timer_s: float,
         averaging: int,
         serial_number: int | None,
+        temperature_c: float = math.nan,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._parser = FrameParser(VERSIONS[version], v1_sample_count=averaging)
@@ -53,6 +55,7 @@ class ImuReader(Node):
         self._averaging = averaging
         self._seen_averaging: int | None = None
         self._serial_number = serial_number
+        self._given_temperature_c = temperature_c
         self._found_number: int | None = None
         self._complaint = ""
         self._tag = 0
@@ -130,8 +133,8 @@ class ImuReader(Node):
         return ""
 
     def _temperature_c(self) -> float:
-        """Mean of the chips that have spoken, NaN before (and for ever with version 1)."""
+        """Mean of the chips that have spoken; before that, and with version 1, what the rig says."""
         seen = self._environment
         chips = (seen.temperature_gyro_c, seen.temperature_tilt_x_c, seen.temperature_tilt_y_c)
         known = [value for value in chips if not math.isnan(value)]
-        return sum(known) / len(known) if known else math.nan
+        return sum(known) / len(known) if known else self._given_temperature_c

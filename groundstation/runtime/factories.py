@@ -73,7 +73,10 @@ def imu_reader(rig: Rig, vehicle: str) -> Node:
     """Parser, clock and scales of the IMU block."""
     imu = rig.mock_up_of(vehicle).imu
     serial_number = rig.vehicles[vehicle].imu_serial_number
-    return ImuReader(vehicle, imu.protocol, imu.baud, imu.ftdi_latency_s, imu.averaging, serial_number)
+    given_c = math.nan if imu.temperature_c is None else imu.temperature_c
+    return ImuReader(
+        vehicle, imu.protocol, imu.baud, imu.ftdi_latency_s, imu.averaging, serial_number, given_c
+    )
 
 
 def fix_reader(rig: Rig, vehicle: str) -> Node:

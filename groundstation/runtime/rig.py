@@ -71,12 +71,14 @@ class ImuSection(_Section):
     """The IMU block: its line, its place and the white noise of its sensors as densities.
 
     ``averaging`` is in polls of 1 kHz per frame: version 2 is asked for it, version 1 must have it.
+    ``temperature_c`` is the operator's reading, for blocks that send none (version 1).
     """
 
     baud: Literal[115200, 250000] = 250000
     protocol: Literal["auto", "v1", "v2"] = "auto"
     averaging: int = Field(default=10, ge=1, le=250)
     ftdi_latency_s: NonNegative = 0.016
+    temperature_c: float | None = None
     position_body_m: tuple[float, float] = (0.0, 0.0)
     position_sigma_m: NonNegative = 0.001
     gyro_density_rad_s_rthz: Positive

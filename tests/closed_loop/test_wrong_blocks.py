@@ -41,3 +41,12 @@ def test_a_legacy_block_that_averages_otherwise_than_the_rig_says_is_named():
     laboratory = laboratory.replace("averaging = 10", "averaging = 10\nframe_version = 1")
     _, warnings = samples_of(station + "[laboratory]" + laboratory, 30.0)
     assert any("averaging = 25" in warning for warning in warnings)
+
+
+def test_a_block_without_a_thermometer_has_the_temperature_that_the_rig_gives():
+    text = (RIGS / "drawn_fixes.toml").read_text()
+    station, laboratory = text.split("[laboratory]", 1)
+    station = station.replace("baud = 250000", 'baud = 250000\nprotocol = "v1"\ntemperature_c = 21.5')
+    laboratory = laboratory.replace("averaging = 10", "averaging = 10\nframe_version = 1")
+    samples, _ = samples_of(station + "[laboratory]" + laboratory, 2.0)
+    assert {sample.temperature_c for sample in samples} == {21.5}
