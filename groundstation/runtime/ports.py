@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from drivers.laboratory import CameraFrame, CanFrame
+from drivers.star_camera.exposure import ExposureDelay
 from groundstation.bus.topics import Delivery
 from groundstation.messages import definitions as m
 from groundstation.messages.base import Message
@@ -77,7 +78,7 @@ class StarCameraPort(PortTranslation):
 
     reads = m.StarImage
 
-    delay_ns: int
+    delay: ExposureDelay
     timeout_s: float
 
     @property
@@ -87,7 +88,7 @@ class StarCameraPort(PortTranslation):
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, CameraFrame)
         height, width = data.image.shape
-        exposure_ns = stamp_ns - self.delay_ns
+        exposure_ns = self.delay.middle_ns(stamp_ns)
         return m.StarImage(exposure_ns, self.vehicle, height, width, "mono8", 0, width, data.image.tobytes())
 
 
@@ -149,7 +150,7 @@ def ports_of(rig: Rig) -> list[PortTranslation]:
                     name,
                     vehicle.star_camera,
                     f"{name}_sky",
-                    round(camera.delay_s * 1e9),
+                    ExposureDelay(camera.delay_s, camera.delay_sigma_s),
                     camera.timeout_s,
                 )
             )
