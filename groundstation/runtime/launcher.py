@@ -64,6 +64,7 @@ class Launcher:
             self._laboratory = Child(LABORATORY)
             self._package = _package_of(rig.laboratory.name)
         self._began_s = 0.0
+        self._untold: set[str] = set()  # started, but still without orders
         self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
@@ -122,6 +123,7 @@ class Launcher:
         now_s = time.monotonic()
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
+        self._tell_all()
         for child in self._children.values():
             self._look_after(child, now_s)
 
@@ -158,9 +160,6 @@ class Launcher:
                 raise GroundStationError(f"the laboratory announces its ports wrongly: {error}") from error
             if self._addresses is not None:
                 laboratory.is_ready = True
-                for child in self._children.values():
-                    if child.name != RECORDER:
-                        self._tell(child)
                 return
         if now_s - laboratory.started_s > START_S:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
@@ -189,8 +188,19 @@ class Launcher:
     def _start(self, child: Child) -> None:
         module = "recorder" if child.name == RECORDER else "process"
         child.start(["-m", f"groundstation.runtime.{module}", child.name])  # the name is for `ps`
-        if self._addresses is not None or child.name == RECORDER:
+        if child.name == RECORDER:
             self._tell(child)
+        else:
+            self._untold.add(child.name)
+
+    def _tell_all(self) -> None:
+        """Give orders once the ports are known and the recorder listens: a replay needs the first byte."""
+        recorder = self._children.get(RECORDER)
+        if self._addresses is None or not (recorder is None or recorder.has_been_ready):
+            return
+        for name in sorted(self._untold):
+            self._tell(self._children[name])
+        self._untold.clear()
 
     def _tell(self, child: Child) -> None:
         """Give a started process its orders; it may have loaded what it needs while we did not know them."""
