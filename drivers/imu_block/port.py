@@ -136,6 +136,6 @@ def _ask_for_low_latency(port: serial.Serial) -> bool:
         return False
     try:
         ask(True)
-    except (ValueError, OSError, NotImplementedError):
+    except (ValueError, OSError, NotImplementedError):  # a pty, a socket, a system without the knob
         return False
     return True

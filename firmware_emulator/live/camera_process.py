@@ -80,6 +80,7 @@ class LiveCamera:
                 self._changed.wait_for(lambda: bool(self._orders))
                 exposure = self._orders.popleft()
             image = self._renderer.render(exposure)
+            # real time is this process's work: a frame leaves when a camera would have sent it
             time.sleep(max(0, exposure.arrival_ns - time.monotonic_ns()) / NS_PER_S)
             with self._changed:
                 self._newest = (exposure.sequence, image)
