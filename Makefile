@@ -1,6 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+CORE := .venv/.core
 
 .PHONY: run test test-all check bench clean
 .DEFAULT_GOAL := help
@@ -19,23 +20,27 @@ $(STAMP): pyproject.toml tools/requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 
-run: $(STAMP)
+$(CORE): $(STAMP) groundstation/core/build.py $(wildcard groundstation/core/*.[ch])
+	@$(BIN)/python tools/build_core.py
+	@touch $(CORE)
+
+run: $(CORE)
 	@$(BIN)/groundstation run examples/rigs/two_mock_ups.toml
 
-test: $(STAMP)
+test: $(CORE)
 	@$(BIN)/python -m pytest -q -n 2
 
-test-all: $(STAMP)
+test-all: $(CORE)
 	@$(BIN)/python -m pytest -q -n 2 -m "not hardware" --ignore tests/closed_loop/live
 	@$(BIN)/python -m pytest -q -m "not hardware" tests/closed_loop/live
 
-check: $(STAMP)
+check: $(CORE)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(STAMP)
+bench: $(CORE)
 	@$(BIN)/python tools/bench.py
 
 clean:

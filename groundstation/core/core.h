@@ -1,0 +1,27 @@
+/* What every file of the core shares.
+ *
+ * Rules: no allocation, no global state, no I/O; callers own all buffers and pass their sizes. Results must not depend
+ * on the instruction set: the build forbids contraction to fused multiply-add and reordering of floating-point sums.
+ */
+#ifndef GROUNDSTATION_CORE_H
+#define GROUNDSTATION_CORE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define GS_EXPORT __declspec(dllexport)
+#else
+#define GS_EXPORT __attribute__((visibility("default")))
+#endif
+
+/* Put before loops over integers or independent elements: compiled for AVX2 too and chosen when the library is loaded.
+ * Sanitizers cannot run the choosing function that early. */
+#if defined(__x86_64__) && defined(__linux__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define GS_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define GS_CLONES
+#endif
+
+#endif

@@ -1,0 +1,8 @@
+/* Which sources this library was made of: the loader refuses a library of other sources. */
+#include "core.h"
+
+#ifndef GS_SOURCES
+#error "GS_SOURCES is set by the build: the hash of all sources and flags"
+#endif
+
+GS_EXPORT const char *gs_sources(void) { return "groundstation core of " GS_SOURCES; }
