@@ -97,6 +97,15 @@ class StarFix:
 
 
 @dataclass(frozen=True, slots=True)
+class PoseGuess:
+    """A pose that some spots agree on, not enough to be believed; it is for people to look at."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class NoFix:
     """No pose, and why.
 
@@ -105,9 +114,11 @@ class NoFix:
         detail: One sentence for people.
         spots: How many light spots were there.
         evidence_nats: Best log-likelihood over chance that any hypothesis reached.
+        guess: The pose of that hypothesis, where it explains more than chance does.
     """
 
     reason: Refusal
     detail: str
     spots: int
     evidence_nats: float = field(default=float("-inf"))
+    guess: PoseGuess | None = None

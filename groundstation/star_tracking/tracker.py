@@ -17,7 +17,15 @@ from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.evidence import SIGMAS_PX, Chance, evidence_nats
-from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import (
+    BodyMotion,
+    Mode,
+    NoFix,
+    PoseGuess,
+    PosePrior,
+    Refusal,
+    StarFix,
+)
 from groundstation.star_tracking.hypotheses import (
     NEIGHBOUR_RANKS,
     Poses,
@@ -85,6 +93,7 @@ class _Search:
     look_ups_left: int
     motion: BodyMotion | None = None
     best_nats: float = -math.inf
+    best_guess: PoseGuess | None = None
     tested: set[tuple[int, int, int]] = field(default_factory=set)
 
 
@@ -109,6 +118,12 @@ class StarTracker:
         self._tolerance_m = self.settings.tolerance_px * self.rays.scale_m_px
         self._tolerance_m += 2.0 * float(np.median(catalogue.std_m))
         self.sky = SkyIndex(catalogue, self._tolerance_m, self.rays.reach_m)
+        self._is_dropped = np.zeros(len(catalogue) + 1, dtype=bool)  # one more: the star that is none
+
+    def drop(self, rows: Index) -> None:
+        """Match no spot to these rows of the catalogue from now on, and to all others again."""
+        self._is_dropped[:] = False
+        self._is_dropped[rows] = True
 
     def solve(
         self, spots: Spots, prior: PosePrior | None = None, motion: BodyMotion | None = None
@@ -123,11 +138,9 @@ class StarTracker:
         n = len(spots)
         if spots.is_flooded or spots.background_dn > _WHITE_DN:
             return NoFix(Refusal.FLOODED, "More of the picture is lit than a sky of stars can.", n)
-        if n == 0:
-            return NoFix(Refusal.NO_SPOTS, "No spot stands out of the noise.", 0)
         needed = self.settings.min_stars if prior is None else self.settings.min_stars_prior
         if n < needed:
-            return NoFix(Refusal.TOO_FEW_STARS, f"{n} spots, a fix needs {needed}.", n)
+            return self._too_few(spots, needed, motion)
         points = self.rays.look_up(spots.u_px, spots.v_px)
         if motion is None or self.settings.exposure_s == 0.0:
             smear = smear_from_streaks(points.q_body_m, spots.streak_px, points.jacobian_m_px)
@@ -218,7 +231,7 @@ class StarTracker:
     def _match(self, q: Complex, turn: complex, shift: complex, gate_m: float) -> tuple[Index, Index]:
         """Give (spot, star) within the gate; of two spots at one star the nearer one."""
         star, distance = self.sky.nearest(turn * q + shift)
-        spot = np.flatnonzero(distance < gate_m)
+        spot = np.flatnonzero((distance < gate_m) & ~self._is_dropped[star])
         if len(spot) == 0:
             return spot, spot
         order = spot[np.argsort(star[spot], kind="stable")]
@@ -259,7 +272,9 @@ class StarTracker:
         assert pose is not None
         residual = turn * q[spot] + shift - self.sky.position_m[star]
         nats = self._evidence(q[spot], np.abs(residual), len(spots), prior, pose)
-        search.best_nats = max(search.best_nats, nats)
+        if nats > search.best_nats:
+            search.best_nats = nats
+            search.best_guess = PoseGuess(shift.real, shift.imag, float(np.angle(turn)))
         if nats < self.settings.evidence_nats or int(pose.kept.sum()) < needed:
             return None
         kept = pose.kept
@@ -314,16 +329,38 @@ class StarTracker:
             Chance(self.sky.density_m2, volume, self.rays.scale_m_px, self.settings.evidence_sigmas_px),
         )
 
+    def _too_few(self, spots: Spots, needed: int, motion: BodyMotion | None) -> NoFix:
+        """Say why there are not even enough spots to begin with: no light, or light drawn out too thin."""
+        n = len(spots)
+        if _are_streaks(spots):
+            return NoFix(Refusal.BLURRED, f"{n} spots, most of them streaks.", n)
+        if motion is not None and self.settings.exposure_s > 0.0:
+            path_m = math.hypot(motion.vx_table_m_s, motion.vy_table_m_s)
+            path_m += 0.5 * self.rays.reach_m * abs(motion.omega_rad_s)
+            streak_px = path_m * self.settings.exposure_s / self.rays.scale_m_px
+            if streak_px > _LONG_STREAK_PX:
+                return NoFix(Refusal.BLURRED, f"{n} spots; stars are streaks of {streak_px:.0f} px.", n)
+        if n == 0:
+            return NoFix(Refusal.NO_SPOTS, "No spot stands out of the noise.", 0)
+        return NoFix(Refusal.TOO_FEW_STARS, f"{n} spots, a fix needs {needed}.", n)
+
     def _refusal(self, spots: Spots, search: _Search) -> NoFix:
         n = len(spots)
-        length = np.hypot(spots.streak_px[:, 0], spots.streak_px[:, 1])
-        if np.count_nonzero(length > _LONG_STREAK_PX) > 0.5 * n:
+        guess = None
+        if _are_streaks(spots):
+            length = np.hypot(spots.streak_px[:, 0], spots.streak_px[:, 1])
             reason = Refusal.BLURRED
             detail = f"{n} spots, most of them streaks of {float(np.median(length)):.0f} px."
         elif math.isfinite(search.best_nats) and search.best_nats > 0.0:
             reason, detail = Refusal.NO_CONSENSUS, "A pose explains some spots, but chance could as well."
+            guess = search.best_guess
         elif n < 2 * self.settings.min_stars:
             reason, detail = Refusal.TOO_FEW_STARS, f"{n} spots fit no place of the catalogue for certain."
         else:
             reason, detail = Refusal.NOT_OUR_CEILING, f"{n} spots fit no place of the catalogue."
-        return NoFix(reason, detail, n, search.best_nats)
+        return NoFix(reason, detail, n, search.best_nats, guess)
+
+
+def _are_streaks(spots: Spots) -> bool:
+    length = np.hypot(spots.streak_px[:, 0], spots.streak_px[:, 1])
+    return bool(np.count_nonzero(length > _LONG_STREAK_PX) > 0.5 * len(spots))
