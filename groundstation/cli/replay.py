@@ -68,6 +68,10 @@ def _replay(
     for name, digest in calibration_hashes(rig).items():
         if found.info.calibration_sha256.get(name, digest) != digest:
             print(f"calibration {name} is not the one of the recording")
+    if info.software not in ("", software()):
+        print(
+            f"recorded with {info.software}, replayed with {software()}: figures may differ by their rounding"
+        )
     output = None if out is None else Recorder(out, replace(info, software=software()))
     try:
         report = ReplayRunner(found, _factory(rig), nodes, allowed, output).run()

@@ -2,10 +2,16 @@
 
 from importlib.metadata import PackageNotFoundError, version
 
+from groundstation.core.library import default_core
+
 
 def software() -> str:
-    """``groundstation`` and the version of the installed package."""
+    """``groundstation``, the version of the installed package, and which code did the heavy work.
+
+    Compiled core and NumPy agree within rounding, not bit for bit: a replay elsewhere has to know.
+    """
     try:
-        return f"groundstation {version('groundstation')}"
+        release = version("groundstation")
     except PackageNotFoundError:
-        return "groundstation (not installed)"
+        release = "(not installed)"
+    return f"groundstation {release}, {default_core().name}"

@@ -38,7 +38,7 @@ def test_what_is_no_library_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CoreError, match="there is no"):
         load_core(tmp_path / "core.so")
     (tmp_path / "core.so").write_text("not a library")
-    with pytest.raises(CoreError, match="no core that this machine can load"):
+    with pytest.raises(CoreError, match="not a core that this machine can load"):
         load_core(tmp_path / "core.so")
 
 

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import app as replay_app
+from groundstation.core.library import default_core
 from groundstation.messages import definitions as m
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
@@ -40,6 +41,16 @@ def test_every_node_of_the_flight_replays_bit_for_bit(flight):
     assert code == 0, said
     assert "all agrees" in said
     assert "state " in said
+
+
+def test_replay_tells_when_other_code_recorded(flight, monkeypatch):
+    with Recording(flight) as found:
+        assert default_core().name in found.info.software
+    monkeypatch.setattr("groundstation.cli.replay.software", lambda: "another ground station")
+    code, said = call(flight)
+    assert code == 0
+    assert default_core().name in " ".join(said.split())
+    assert "replayed with another ground station" in " ".join(said.split())
 
 
 def test_equal_seeds_give_equal_files(tmp_path, flight):
