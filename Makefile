@@ -2,6 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 CORE := .venv/.core
+PEERS := .venv/.peers
 
 .PHONY: run test test-all check bench clean
 .DEFAULT_GOAL := help
@@ -40,7 +41,13 @@ check: $(CORE)
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-bench: $(CORE)
+$(PEERS): tools/requirements-bench.lock | $(STAMP)
+	@echo "Installing what the benches stand beside (once) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	  -r tools/requirements-bench.lock && touch $(PEERS) \
+	  || echo "They could not be installed: their rows will say so."
+
+bench: $(CORE) $(PEERS)
 	@$(BIN)/python tools/bench.py
 
 clean:

@@ -89,5 +89,13 @@ def test_no_frame_is_lost_in_virtual_time(bench, recording):
     assert frames > 390
 
 
+def test_the_lock_of_the_benches_pins_the_same_releases_as_the_lock_of_the_tests():
+    def pins(name):
+        lines = (ROOT / "tools" / name).read_text().splitlines()
+        return {line.rstrip("\\ ") for line in lines if line and not line.startswith(" ")}
+
+    assert pins("requirements.lock") < pins("requirements-bench.lock")
+
+
 def test_the_unit_takes_time(bench):
     assert 0.0 < bench("unit").reference_unit_s() < 10.0
