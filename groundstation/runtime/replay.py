@@ -8,12 +8,14 @@ pass over the file in log order; memory holds what lies between a message and it
 from collections import deque
 from collections.abc import Callable, Collection
 
-from groundstation.bus.journal import NO_NODE, Kind, read_entries
+import numpy as np
+
+from groundstation.bus.journal import Kind, read_entries
 from groundstation.bus.topics import TOPICS, Topic, topic_of
 from groundstation.messages.definitions import Journal
 from groundstation.nodes.node import Node
 from groundstation.recording.policy import is_kept
-from groundstation.recording.reader import Recording
+from groundstation.recording.reader import Recorded, Recording
 from groundstation.recording.writer import Recorder
 from groundstation.runtime.errors import UsageError
 from groundstation.runtime.replay_comparison import EXACT, Comparison, Tolerances
@@ -85,6 +87,7 @@ class ReplayRunner:
         heard = {topic_of(kind) for node in prepared.values() for kind in node.inputs}
         said = {topic_of(kind) for node in prepared.values() for kind in node.outputs}
         self._said = {topic.index for topic in said}
+        self._queues: dict[tuple[int, str], list[deque[Recorded]]] = {}
         self._stream = recording.messages(heard | said | {topic_of(Journal)})
         self._log_ns = 0
 
@@ -127,21 +130,30 @@ class ReplayRunner:
             journal = message.payload
             assert isinstance(journal, Journal)
             self._backlog.append(journal)
-        for node in self._replayed_nodes.values():
-            node.hear(message)
+        key = (topic.index, message.envelope.vehicle)
+        queues = self._queues.get(key)
+        if queues is None:
+            queues = self._queues[key] = self._hearers(topic, message.envelope.vehicle)
+        for queue in queues:
+            queue.append(message)
         if topic.index in self._said:
             self._comparison.recorded(message)
         return True
 
+    def _hearers(self, topic: Topic, owner: str) -> list[deque[Recorded]]:
+        found = (node.queue_for(topic, owner) for node in self._replayed_nodes.values())
+        return [queue for queue in found if queue is not None]
+
     def _follow(self, journal: Journal) -> None:
         names = journal.names
-        for entry in read_entries(journal.entries).tolist():
+        nodes = [self._replayed_nodes.get(name) for name in names]
+        entries = read_entries(journal.entries)
+        wanted = [index for index, node in enumerate(nodes) if node is not None]  # never that of no node
+        chosen = np.isin(entries["node"], wanted) & (entries["kind"] != Kind.DROP)
+        for entry in entries[chosen].tolist():
             now_ns, sequence, kind, topic_index, node_index, owner_index = entry[:6]
-            if node_index == NO_NODE:
-                continue
-            node = self._replayed_nodes.get(names[node_index])
-            if node is None or kind == Kind.DROP:
-                continue
+            node = nodes[node_index]
+            assert node is not None
             if not node.is_started and kind != Kind.START:
                 self._report.before_start += 1  # of an earlier life, whose start the recording missed
                 continue

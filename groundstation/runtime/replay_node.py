@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from groundstation.bus.topics import Scope, topic_of
+from groundstation.bus.topics import Scope, Topic, topic_of
 from groundstation.messages.base import Message
 from groundstation.nodes.node import Node
 from groundstation.recording.reader import Recorded
@@ -40,16 +40,12 @@ class ReplayedNode:
         """Whose topic it is that the node spoke on."""
         return self._process if topic_of(type(payload)).scope is Scope.PROCESS else payload.vehicle
 
-    def hear(self, message: Recorded) -> None:
-        """Keep a recorded message if the node hears it."""
-        topic = message.envelope.topic
+    def queue_for(self, topic: Topic, owner: str) -> deque[Recorded] | None:
+        """Where recorded messages of a topic of an owner wait for this node; None if it is deaf to them."""
         kind = self._heard.get(topic.index)
-        if kind is None:
-            return
-        owner = message.envelope.vehicle
-        if topic.scope is Scope.VEHICLE and owner not in self.node.vehicles_heard(kind):
-            return
-        self._queues.setdefault((topic.index, owner), deque()).append(message)
+        if kind is None or (topic.scope is Scope.VEHICLE and owner not in self.node.vehicles_heard(kind)):
+            return None
+        return self._queues.setdefault((topic.index, owner), deque())
 
     def find(self, index: int, owner: str, sequence: int) -> Recorded | None:
         """The message consumed; older ones are forgotten, itself is kept: a latched one may come again."""
