@@ -109,6 +109,7 @@ _ROWS = (
     _row("reference", m.ReferenceState, 100, observers_only=True),
     _row("sky_change", m.SkyChange, 0),
     _row("calibration", m.CalibrationInUse, 0, latched=True),
+    _row("fusion_calibration", m.FusionCalibration, 0, latched=True),
     _row("diagnostics", m.Diagnostics, 1, scope=Scope.PROCESS),
     _row("journal", m.Journal, 10, scope=Scope.PROCESS),
     _row("latency", m.Latency, 1, observers_only=True),

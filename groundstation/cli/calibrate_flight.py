@@ -18,33 +18,13 @@ from calibration.imu.result import CalibrationResult, Quantity, provenance_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion import estimate
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
-from groundstation.fusion import error_state as es
+from groundstation.fusion.constants import CONSTANTS
 from groundstation.fusion.estimator import FixAccount
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 
 WIDE_GATE = 60.0
 """While a scale is still unknown, good fixes look worse than they are."""
-CONSTANTS = {
-    "gyro_bias": (es.GYRO_BIAS, "rad/s"),
-    "acc_bias_x": (es.ACC_BIAS_X, "m/s^2"),
-    "acc_bias_y": (es.ACC_BIAS_Y, "m/s^2"),
-    "gyro_scale": (es.GYRO_SCALE, "1"),
-    "acc_scale_x": (es.ACC_MATRIX, "1"),
-    "acc_cross_xy": (es.ACC_MATRIX + 1, "1"),
-    "acc_cross_yx": (es.ACC_MATRIX + 2, "1"),
-    "acc_scale_y": (es.ACC_MATRIX + 3, "1"),
-    "lever_x": (es.LEVER_X, "m"),
-    "lever_y": (es.LEVER_Y, "m"),
-    "gyro_temperature_slope": (es.GYRO_TEMPCO, "rad/s/C"),
-    "acc_x_temperature_slope": (es.ACC_TEMPCO_X, "m/s^2/C"),
-    "acc_y_temperature_slope": (es.ACC_TEMPCO_Y, "m/s^2/C"),
-    "slope_x": (es.SLOPE_X, "m/s^2"),
-    "slope_y": (es.SLOPE_Y, "m/s^2"),
-    "camera_delay": (es.FIX_DELAY, "s"),
-}
-"""Biases are those at the end of the recording and at its first temperature."""
-
 OutOption = Annotated[Path, typer.Option(help="File to write.")]
 PlotOption = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
 
@@ -58,6 +38,7 @@ def widened(noise: NoiseModel) -> NoiseModel:
         imu_offset_sigma_m=0.02,
         tempco_sigma_ratio=1.0,
         fix_delay_sigma_s=0.02,
+        calibrated=(),
         gate_nis=WIDE_GATE,
     )
 

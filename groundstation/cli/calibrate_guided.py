@@ -21,7 +21,6 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.calibrate_flight import constants, widened
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import write_atomically
-from groundstation.cli.table_map_flights import noise_of
 from groundstation.fusion import error_state as es
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.messages.cdr import CodecError
@@ -29,6 +28,7 @@ from groundstation.messages.definitions import Imu, StarFix, ValveStatus
 from groundstation.nodes.fusion import Fusion
 from groundstation.runtime.asking import ask
 from groundstation.runtime.errors import GroundStationError
+from groundstation.runtime.estimation import fix_floor_of, rig_noise
 from groundstation.runtime.rig import load_rig
 from groundstation.runtime.running import find_running
 
@@ -68,15 +68,8 @@ def imu(
         raise UsageError(
             f"no run with a vehicle {name!r} is going on: start it with `groundstation run {rig}`."
         )
-    mock_up = known_rig.mock_up_of(name)
-    noise = noise_of(mock_up)
-    smoother = OfflineSmoother(widened(noise))
-    floor = (
-        (0.0, 0.0)
-        if known_rig.vehicles[name].fixes
-        else (noise.star_sigma_xy_m, noise.star_sigma_heading_rad)
-    )
-    watch = _Watch(Fusion(name, smoother, "filter", floor), smoother)
+    smoother = OfflineSmoother(widened(rig_noise(known_rig, name)))
+    watch = _Watch(Fusion(name, smoother, "filter", fix_floor_of(known_rig, name)), smoother)
     sequence = GuidedSequence()
     try:
         with ZenohBus(run.endpoint) as bus:

@@ -23,6 +23,7 @@ from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 from groundstation.fusion.stamp_ticks import StampTicks
+from groundstation.runtime.estimation import slope_grid
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
@@ -90,13 +91,9 @@ def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth
 
 def _read_map(path: Path) -> SlopeGrid:
     try:
-        found = TableMap.load(path)
+        return slope_grid(TableMap.load(path))
     except TableMapError as error:
         raise UsageError(f"{error}.") from None
-    std = np.sqrt(0.5 * (found.std_x_m_s2**2 + found.std_y_m_s2**2))
-    return SlopeGrid(
-        found.x_min_m, found.y_min_m, found.step_m, found.ax_m_s2, found.ay_m_s2, std, found.mean_m_s2
-    )
 
 
 def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:

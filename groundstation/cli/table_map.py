@@ -38,7 +38,8 @@ def table_map(
     out: Annotated[Path, typer.Option(help="TOML to write; the grid goes beside it as .npz.")],
     plot: Annotated[Path | None, typer.Option(help="PNG to draw as well.")] = None,
     leg: Annotated[
-        list[str] | None, typer.Option(help="A leg of the table, NAME:X,Y in m; three or more.")
+        list[str] | None,
+        typer.Option(help="A leg of the table, NAME:X,Y in m; three or more. Else those of the rig."),
     ] = None,
     bounds: Annotated[
         str | None, typer.Option(help="Edges of the table in m: X_MIN,X_MAX,Y_MIN,Y_MAX.")
@@ -63,6 +64,7 @@ def table_map(
         raise UsageError(f"--shortest-wave-m must lie within 0.15 and 5 m, found {shortest_wave_m:g}.")
     sources = [read_source(path, rig, vehicle) for path in flights]
     logs = [log for source in sources for log in source.logs]
+    legs = legs or next((dict(source.legs_m) for source in sources if source.legs_m), {})
     basis = SurfaceBasis.over(given or _table_of(sources), shortest_wave_m)
     try:
         fit = fit_surface([flight_equations(log, basis, PRIORS) for log in logs], basis)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,15 @@ from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion import estimate
 from groundstation.cli.fusion_folder import read_folder
 from groundstation.fusion.estimator import Fix, FixAccount, ImuPacket, PlanarState
-from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
+from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.messages import definitions as m
 from groundstation.nodes.fusion import Fusion
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.runtime.errors import RigError
-from groundstation.runtime.rig import MockUpSection, Rig, load_rig, parse_rig
+from groundstation.runtime.estimation import fix_floor_of, rig_noise
+from groundstation.runtime.rig import load_rig, parse_rig
 
 Array = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -44,6 +45,8 @@ class Source:
     logs: tuple[FlightLog, ...]
     bounds_m: Bounds | None
     """Of the table, where the rig says."""
+    legs_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Where the legs stand, likewise."""
 
 
 class _Tap(OfflineSmoother):
@@ -112,41 +115,15 @@ def _read_recording(path: Path, recording: Recording, rig_path: Path | None, veh
         raise UsageError(f"{path} has no vehicle {vehicle!r}; there are {', '.join(rig.vehicles)}.")
     logs = []
     for name in rig.vehicles if vehicle is None else (vehicle,):
-        tap = _Tap(noise_of(rig.mock_up_of(name)))
-        node = Fusion(name, tap, "filter", _floor(rig, name))
+        tap = _Tap(rig_noise(rig, name))
+        node = Fusion(name, tap, "filter", fix_floor_of(rig, name))
         for message in recording.messages(HEARD, (name,)):
             for _ in node.receive(message.payload, message.log_ns):
                 pass
         logs.append(_flight_log(f"{path.name}:{name}", tap))
     table = rig.table
-    return Source(path, tuple(logs), (table.x_min_m, table.x_max_m, table.y_min_m, table.y_max_m))
-
-
-def noise_of(mock_up: MockUpSection) -> NoiseModel:
-    """Return the error model that a rig states for a type of mock-up."""
-    imu, camera = mock_up.imu, mock_up.star_camera
-    return NoiseModel(
-        packet_period_s=imu.averaging * 1e-3,
-        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
-        acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
-        star_sigma_xy_m=camera.sigma_xy_m if camera is not None else 0.001,
-        star_sigma_heading_rad=camera.sigma_heading_rad if camera is not None else math.radians(0.05),
-        imu_offset_x_m=imu.position_body_m[0],
-        imu_offset_y_m=imu.position_body_m[1],
-        imu_offset_sigma_m=imu.position_sigma_m,
-        gyro_tempco_rad_s_c=imu.gyro_tempco_rad_s_k,
-        acc_tempco_m_s2_c=imu.acc_tempco_m_s2_k,
-        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
-        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
-    )
-
-
-def _floor(rig: Rig, vehicle: str) -> tuple[float, float]:
-    """What calibration leaves in every fix; an external pose stream says all of it itself."""
-    camera = rig.mock_up_of(vehicle).star_camera
-    if rig.vehicles[vehicle].fixes is not None or camera is None:
-        return 0.0, 0.0
-    return camera.sigma_xy_m, camera.sigma_heading_rad
+    edges = (table.x_min_m, table.x_max_m, table.y_min_m, table.y_max_m)
+    return Source(path, tuple(logs), edges, table.legs)
 
 
 def _flight_log(name: str, tap: _Tap) -> FlightLog:

@@ -48,6 +48,8 @@ def initial_state(noise: NoiseModel) -> Array:
     x[LEVER_Y] = noise.imu_offset_y_m
     x[GYRO_TEMPCO] = noise.gyro_tempco_rad_s_c
     x[ACC_TEMPCO_X] = x[ACC_TEMPCO_Y] = noise.acc_tempco_m_s2_c
+    for k, value, _ in noise.calibrated:
+        x[k] = value
     return x
 
 
@@ -64,6 +66,8 @@ def initial_variance(noise: NoiseModel) -> Array:
     sigma[GYRO_TEMPCO] = noise.tempco_sigma_ratio * abs(noise.gyro_tempco_rad_s_c)
     sigma[ACC_TEMPCO_X : ACC_TEMPCO_Y + 1] = noise.tempco_sigma_ratio * abs(noise.acc_tempco_m_s2_c)
     sigma[FIX_DELAY] = noise.fix_delay_sigma_s
+    for k, _, left in noise.calibrated:
+        sigma[k] = left
     return sigma**2
 
 

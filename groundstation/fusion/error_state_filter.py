@@ -106,6 +106,11 @@ class ErrorStateFilter:
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
         return C
 
+    def slope_left(self) -> tuple[float, float]:
+        """Return the table's pull beyond the map, x, y (m/s^2), as of the last used fix."""
+        x = self.x
+        return float(x[es.SLOPE_X] + x[es.WAVE_X]), float(x[es.SLOPE_Y] + x[es.WAVE_Y])
+
     def add_fix(self, fix: Fix) -> FixAccount:
         """Take a fix at its arrival and give account of it."""
         account = self._judge(fix)

@@ -118,6 +118,9 @@ class Estimator(Protocol):
     def covariance(self) -> Array:
         """Return (6, 6) of x, y, heading, vx, vy, omega at the newest packet, centre of mass."""
 
+    def slope_left(self) -> tuple[float, float]:
+        """Return the table's pull (x, y, m/s^2) believed beyond a map; zeros where none is estimated."""
+
 
 class EstimatorFactory(Protocol):
     """How a row of the table of estimators is made."""

@@ -47,6 +47,9 @@ class NoiseModel:
     acc_scale_sigma: float = 1e-2
     """Of the accelerometers' scale and of the angles between their axes and the body's."""
 
+    calibrated: tuple[tuple[int, float, float], ...] = ()
+    """Constants that calibration files give: error state, value, sigma; in the place of what stands above."""
+
     slope_sigma_m_s2: float = 3e-3
     """Mean tilt of the table as gravity along it (9.8 mm/s^2 per mrad)."""
     waviness_sigma_m_s2: float = 2.8e-4

@@ -61,6 +61,10 @@ class OfflineSmoother:
         """Return the causal covariance (6, 6) at the newest packet."""
         return self._filter.covariance()
 
+    def slope_left(self) -> tuple[float, float]:
+        """Return the table's pull beyond the map, causal."""
+        return self._filter.slope_left()
+
     def sigmas(self) -> Array:
         """Return (23,) sigmas of the error states at the last used fix, causal."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self._filter.P), 0.0)))

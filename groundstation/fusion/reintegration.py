@@ -130,6 +130,10 @@ class ReintegrationEstimator:
             False,
         )
 
+    def slope_left(self) -> tuple[float, float]:
+        """The published method holds bias and slope in one offset and cannot name either."""
+        return 0.0, 0.0
+
     def covariance(self) -> Array:
         """Return (6, 6) with the fixes' variances; the method knows nothing else."""
         C = np.full((6, 6), math.nan)

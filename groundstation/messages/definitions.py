@@ -13,6 +13,7 @@ from groundstation.messages.command import (
 )
 from groundstation.messages.estimate import (
     FixAccount,
+    FusionCalibration,
     FusionStatus,
     ReferenceBytes,
     ReferenceState,
@@ -41,6 +42,7 @@ __all__ = [
     "Diagnostics",
     "FixAccount",
     "FixBytes",
+    "FusionCalibration",
     "FusionStatus",
     "Imu",
     "ImuBytes",

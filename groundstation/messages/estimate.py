@@ -14,6 +14,7 @@ from groundstation.messages.base import (
     Float64x3,
     Message,
     Text,
+    TextSequence,
 )
 
 
@@ -66,6 +67,7 @@ class FusionStatus(Message):
         fixes_used: Since start.
         fixes_refused: Since start.
         fix_age_s: Since the exposure of the newest used fix, infinity before the first.
+        slope_left_m_s2: The table's pull beyond the map as estimated, table x, y; zeros where it is not.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FusionStatus"
@@ -77,6 +79,23 @@ class FusionStatus(Message):
     fixes_used: U32
     fixes_refused: U32
     fix_age_s: F64
+    slope_left_m_s2: Float64x2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusionCalibration(Message):
+    """The calibration files that estimator and controller were made from, as they were then; latched.
+
+    Attributes:
+        names: Keys of the rig, one per file.
+        sha256: Of each file.
+        contents: Texts of the files; that of a table map names the hash of its grid.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FusionCalibration"
+    names: TextSequence
+    sha256: TextSequence
+    contents: TextSequence
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller as ControlLaw
@@ -9,10 +10,12 @@ from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.frames import wrap_angle
+from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import (
     Ack,
     ControlStatus,
+    FusionStatus,
     Request,
     ValveCommand,
     ValveDemand,
@@ -37,9 +40,10 @@ class Controller(Node):
         keep_in: Goals outside are refused.
         neighbours: Other vehicles whose states the law wants.
         period_s: Of the modulation.
+        table_map: What pulls where on the table, fed forward; None where nobody knows.
     """
 
-    inputs = (VehicleState, ValveDemand, ValveCommand, Request)
+    inputs = (VehicleState, FusionStatus, ValveDemand, ValveCommand, Request)
     outputs = (Wrench, ControlStatus, Ack)
 
     def __init__(
@@ -51,6 +55,7 @@ class Controller(Node):
         keep_in: KeepIn,
         neighbours: tuple[str, ...],
         period_s: float,
+        table_map: SlopeGrid | None = None,
     ) -> None:
         super().__init__(vehicle, round(period_s * 1e9))
         self._law = law
@@ -60,6 +65,8 @@ class Controller(Node):
         self._neighbours = neighbours
         self._states: dict[str, tuple[int, ControlState]] = {}
         self._own_rate = RateMean()
+        self._map = table_map
+        self._slope_left_m_s2 = (0.0, 0.0)
         self._gate_open = False
         self._delivered = NO_WRENCH
         self._ticks = 0
@@ -81,6 +88,8 @@ class Controller(Node):
                 self._states[message.vehicle] = (message.stamp_ns, state)
                 if message.vehicle == self.vehicle:
                     self._own_rate.add(state)
+            case FusionStatus():
+                self._slope_left_m_s2 = message.slope_left_m_s2
             case ValveDemand():
                 self._delivered = BodyWrench(message.delivered_force_body_n, message.delivered_torque_nm)
             case ValveCommand():
@@ -101,7 +110,7 @@ class Controller(Node):
         if state is None or fresh.pop(self.vehicle, None) is None:
             return
         wrench = self._law.update(
-            state,
+            self._with_slope(state),
             self._goal,
             self.tick_period_ns * 1e-9,
             applied=self._delivered if self._gate_open else NO_WRENCH,
@@ -112,6 +121,13 @@ class Controller(Node):
         self._ticks += 1
         if self._ticks % STATUS_EVERY == 0:
             yield self._status(state, now_ns)
+
+    def _with_slope(self, state: ControlState) -> ControlState:
+        """Add what is known to pull here: the map, and what the filter finds beyond it."""
+        if self._map is None:
+            return state
+        known, left = self._map.at(*state.position_table_m), self._slope_left_m_s2
+        return replace(state, slope_table_m_s2=(known[0] + left[0], known[1] + left[1]))
 
     def _go_to(self, request: Request) -> str:
         """Take the goal, or say why not."""

@@ -1,7 +1,8 @@
 """Fusion: IMU samples and late star fixes in, vehicle state out."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from groundstation.messages.base import Message
 from groundstation.messages.definitions import (
     Diagnostics,
     FixAccount,
+    FusionCalibration,
     FusionStatus,
     Imu,
     Request,
@@ -25,6 +27,7 @@ from groundstation.nodes.node import Node
 STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
 DIAGNOSTICS_EVERY = 5
+NO_FILES: Mapping[str, tuple[str, str]] = MappingProxyType({})
 
 
 class Fusion(Node):
@@ -35,17 +38,24 @@ class Fusion(Node):
         estimator: A fresh one.
         method: Its row in the table of estimators.
         floor_std: What calibration leaves in every fix, beyond its own covariance: x, y (m), heading (rad).
+        calibration: The files that the estimator was made from, by name: hash and text.
     """
 
     inputs = (Imu, StarFix, ValveStatus, Request)
-    outputs = (VehicleState, FixAccount, FusionStatus, Diagnostics)
+    outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
-        self, vehicle: str, estimator: Estimator, method: str, floor_std: tuple[float, float]
+        self,
+        vehicle: str,
+        estimator: Estimator,
+        method: str,
+        floor_std: tuple[float, float],
+        calibration: Mapping[str, tuple[str, str]] = NO_FILES,
     ) -> None:
         super().__init__(vehicle, STATUS_PERIOD_NS)
         self._estimator = estimator
         self._method = method
+        self._calibration = calibration
         self._floor = np.diag([floor_std[0] ** 2, floor_std[0] ** 2, floor_std[1] ** 2])
         self._skipped_ms = 0
         self._rest_since_ns: int | None = None
@@ -54,6 +64,11 @@ class Fusion(Node):
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
+
+    def start(self, now_ns: int) -> Iterator[Message]:
+        if self._calibration:
+            hashes, texts = zip(*self._calibration.values(), strict=True)
+            yield FusionCalibration(now_ns, self.vehicle, tuple(self._calibration), hashes, texts)
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
@@ -87,6 +102,7 @@ class Fusion(Node):
             self._used,
             self._refused,
             age_s,
+            self._estimator.slope_left(),
         )
         self._ticks += 1
         if self._ticks % DIAGNOSTICS_EVERY == 0:

@@ -12,7 +12,7 @@ from groundstation.control.mux import MuxConfig
 from groundstation.control.registry import make_controller
 from groundstation.control.state import Goal
 from groundstation.control.vehicle import VehicleModel, square_of_eight
-from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
+from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.nodes.allocation import Allocation
 from groundstation.nodes.command_mux import CommandMux
@@ -25,6 +25,7 @@ from groundstation.nodes.node import Node
 from groundstation.nodes.reference_reader import ReferenceReader
 from groundstation.nodes.start_sequence import StartSequence
 from groundstation.nodes.valve_writer import ValveWriter
+from groundstation.runtime.estimation import calibration_texts, fix_floor_of, noise_of, slope_grid_of
 from groundstation.runtime.rig import MOCK_UP_RADIUS_M, MockUpSection, Rig
 
 
@@ -105,30 +106,11 @@ def star_tracker(rig: Rig, vehicle: str) -> Node:
 
 
 def fusion(rig: Rig, vehicle: str) -> Node:
-    """The rig's estimator with its noise model."""
-    mock_up = rig.mock_up_of(vehicle)
-    imu, camera = mock_up.imu, mock_up.star_camera
-    sigma_xy_m = camera.sigma_xy_m if camera is not None else 0.001
-    sigma_heading_rad = camera.sigma_heading_rad if camera is not None else math.radians(0.05)
-    noise = NoiseModel(
-        packet_period_s=imu.averaging * 1e-3,
-        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
-        acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
-        star_sigma_xy_m=sigma_xy_m,
-        star_sigma_heading_rad=sigma_heading_rad,
-        imu_offset_x_m=imu.position_body_m[0],
-        imu_offset_y_m=imu.position_body_m[1],
-        imu_offset_sigma_m=imu.position_sigma_m,
-        gyro_tempco_rad_s_c=imu.gyro_tempco_rad_s_k,
-        acc_tempco_m_s2_c=imu.acc_tempco_m_s2_k,
-        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
-        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
-        fix_delay_sigma_s=camera.delay_sigma_s if camera is not None else 0.0,
-    )
-    method = mock_up.fusion.method
-    external = rig.vehicles[vehicle].fixes is not None  # its covariance is the whole truth
-    floor = (0.0, 0.0) if external else (sigma_xy_m, sigma_heading_rad)
-    return Fusion(vehicle, ESTIMATORS[method](noise), method, floor)
+    """The rig's estimator with its noise model and what calibration files say."""
+    method = rig.mock_up_of(vehicle).fusion.method
+    noise, grid = noise_of(rig, vehicle), slope_grid_of(rig)
+    estimator = ESTIMATORS[method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
+    return Fusion(vehicle, estimator, method, fix_floor_of(rig, vehicle), calibration_texts(rig, vehicle))
 
 
 def controller(rig: Rig, vehicle: str) -> Node:
@@ -138,7 +120,10 @@ def controller(rig: Rig, vehicle: str) -> Node:
     law = make_controller(section.controller, section.parameters, _model(mock_up), keep_in)
     goal = Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg))
     neighbours = tuple(name for name in section.parameters.get("neighbours", {}) if name in rig.vehicles)
-    return Controller(vehicle, law, section.controller, goal, keep_in, neighbours, mock_up.valves.period_s)
+    period_s = mock_up.valves.period_s
+    return Controller(
+        vehicle, law, section.controller, goal, keep_in, neighbours, period_s, slope_grid_of(rig)
+    )
 
 
 def allocation(rig: Rig, vehicle: str) -> Node:

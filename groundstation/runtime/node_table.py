@@ -15,6 +15,7 @@ from groundstation.bus.journal import JournalWriter
 from groundstation.nodes.node import Node
 from groundstation.runtime import factories
 from groundstation.runtime.errors import RigError
+from groundstation.runtime.estimation import noise_of
 from groundstation.runtime.rig import Rig
 from groundstation.runtime.slot import NodeSlot, Sequences, Timing
 
@@ -101,9 +102,11 @@ def check_rig(rig: Rig) -> None:
     """Refuse a rig before anything is started: node names, placement, calibration files.
 
     Raises:
-        RigError: An unknown node, or a heavy node together with an urgent one.
+        RigError: An unknown node, a heavy node together with an urgent one, a wrong table map or calibration.
         CalibrationFileError: A file of a star camera is missing or wrong.
     """
+    for vehicle in rig.vehicles:
+        noise_of(rig, vehicle)  # reads the table map and the IMU's calibration
     for mock_up in rig.mock_ups.values():
         if mock_up.star_camera is not None:
             CameraCalibration.load(mock_up.star_camera.camera)

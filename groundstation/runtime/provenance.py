@@ -6,6 +6,7 @@ from pathlib import Path
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.software import software
+from groundstation.runtime.estimation import calibration_files
 from groundstation.runtime.rig import Rig
 
 
@@ -18,6 +19,9 @@ def calibration_hashes(rig: Rig) -> dict[str, str]:
                 path: Path = getattr(mock_up.star_camera, role)
                 if path.exists():
                     hashes[f"{name}.{role}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    for name, path in calibration_files(rig):
+        if path.exists():
+            hashes[name] = hashlib.sha256(path.read_bytes()).hexdigest()
     return hashes
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import can
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from calibration.table.levelling import levelling
 from drivers.valve_bus.messages import MAX_VEHICLES
 from groundstation.control.registry import CONTROLLERS
 from groundstation.fusion.registry import ESTIMATORS
@@ -29,12 +31,31 @@ class _Section(BaseModel):
 
 
 class TableSection(_Section):
-    """The table: its edges in table coordinates."""
+    """The table: its edges in table coordinates, and what is known of how it pulls.
+
+    ``map`` is the result of ``calibrate table-map``: filter and controller feed it forward. ``legs`` say
+    where the legs stand, for advice on levelling. The sigmas say how far from level and flat a table without
+    a map may be; what is left out is the filter's own.
+    """
 
     x_min_m: float
     x_max_m: float
     y_min_m: float
     y_max_m: float
+    map: Path | None = None
+    legs: dict[str, tuple[float, float]] = Field(default_factory=dict)
+    slope_sigma_m_s2: Positive | None = None
+    waviness_sigma_m_s2: Positive | None = None
+    waviness_length_m: Positive | None = None
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.legs:
+            try:
+                levelling((0.0, 0.0), np.eye(2), self.legs)
+            except ValueError as error:
+                raise ValueError(f"legs: {error}") from error
+        return self
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -71,7 +92,8 @@ class ImuSection(_Section):
     """The IMU block: its line, its place and the white noise of its sensors as densities.
 
     ``averaging`` is in polls of 1 kHz per frame: version 2 is asked for it, version 1 must have it.
-    ``temperature_c`` is the operator's reading, for blocks that send none (version 1).
+    ``temperature_c`` is the operator's reading, for blocks that send none (version 1). ``calibration``
+    names results of ``calibrate`` (joint, imu, tilt, gyro-scale, temperature): the filter starts from them.
     """
 
     baud: Literal[115200, 250000] = 250000
@@ -87,6 +109,7 @@ class ImuSection(_Section):
     acc_tempco_m_s2_k: NonNegative = 0.0003
     gyro_bandwidth_hz: NonNegative = 0.0
     acc_bandwidth_hz: NonNegative = 0.0
+    calibration: tuple[Path, ...] = ()
 
 
 class StarCameraSection(_Section):
@@ -234,6 +257,17 @@ class Rig(_Section):
         return self
 
     @model_validator(mode="after")
+    def _map_is_used(self) -> Self:
+        for name, mock_up in self.mock_ups.items():
+            method = mock_up.fusion.method
+            if self.table.map is not None and method != "filter":
+                raise ValueError(
+                    f"table.map: the estimator {method!r} of mock_ups.{name} takes no map: "
+                    "choose 'filter', or leave the map out"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _consistent(self) -> Self:
         indices: dict[int, str] = {}
         imus: dict[str, str] = {}
@@ -326,8 +360,14 @@ def _anchor(rig: Rig, folder: Path) -> Rig:
             camera = camera.model_copy(
                 update={"camera": folder / camera.camera, "ceiling": folder / camera.ceiling}
             )
-        mock_ups[name] = mock_up.model_copy(update={"star_camera": camera})
+        imu = mock_up.imu.model_copy(
+            update={"calibration": tuple(folder / path for path in mock_up.imu.calibration)}
+        )
+        mock_ups[name] = mock_up.model_copy(update={"star_camera": camera, "imu": imu})
     laboratory = rig.laboratory
     if laboratory is not None:
         laboratory = laboratory.model_copy(update={"folder": str(folder.resolve())})
-    return rig.model_copy(update={"mock_ups": mock_ups, "laboratory": laboratory})
+    table = rig.table
+    if table.map is not None:
+        table = table.model_copy(update={"map": folder / table.map})
+    return rig.model_copy(update={"table": table, "mock_ups": mock_ups, "laboratory": laboratory})
