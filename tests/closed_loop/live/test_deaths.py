@@ -3,18 +3,21 @@
 import itertools
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
 from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import _factory
-from groundstation.messages.definitions import SequencePhase, ValveStatus, VehicleState
+from groundstation.messages.definitions import SequencePhase, StarFix, ValveStatus, VehicleState
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.runtime.replay import ReplayRunner
 from groundstation.runtime.rig import parse_rig
 
 pytestmark = pytest.mark.slow
+
+RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 
 
 def fly_and(launch, rig, name, number):
@@ -91,6 +94,25 @@ def test_a_dead_recorder_loses_nothing_that_was_written_and_goes_on_in_another_f
     recover(run.recording.with_name("run.mcap.part"), whole)
     assert len(of(whole, VehicleState, "alpha")) > 50
     assert any("not finished" in line for line in run.lines)
+
+
+def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launch, tmp_path):
+    text = (RIGS / "two_mock_ups.toml").read_text()
+    text = text.replace("../../calibration", str(RIGS.parents[1] / "calibration"))
+    rig = tmp_path / "rig.toml"
+    short_rest = "[mock_ups.standard.fusion]\nrest_s = 2.0\n\n[vehicles.alpha]"
+    rig.write_text(text.replace("[vehicles.alpha]", short_rest))
+    run, _ = fly_and(launch, rig, "alpha_sky", signal.SIGKILL)
+    run.wait_for("alpha_sky was ended by SIGKILL; starting it again")
+    run.wait_for("alpha/star_camera: open")
+    for _ in range(4):
+        run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    assert longest_silence_s(of(run.recording, StarFix, "alpha")) > 0.5
+    assert longest_silence_s(of(run.recording, StarFix, "beta")) < 1.0
+    for vehicle in ("alpha", "beta"):
+        assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0
+        assert of(run.recording, VehicleState, vehicle)[-1].status == "flying"
 
 
 def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):
