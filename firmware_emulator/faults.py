@@ -20,7 +20,7 @@ class FaultKind:
     """A row of the table.
 
     Attributes:
-        device: Whom it befalls: `serial`, `imu`, `camera`, `valves`.
+        device: Whom it befalls: `serial`, `imu`, `camera`, `sky` (rendered pictures only), `valves`.
         says: What happens.
         parameters: Name to default value; a scenario may give these and no others.
     """
@@ -41,6 +41,10 @@ FAULT_KINDS: Mapping[str, FaultKind] = {
     "silent_camera": FaultKind("camera", "The camera sends nothing.", {}),
     "false_lights": FaultKind("camera", "Lights that no catalogue knows; drawn fixes are wrong.",
                               {"count": 5.0}),
+    "dead_star": FaultKind("sky", "One LED of the ceiling is dark.", {"star": 0.0}),
+    "moved_star": FaultKind("sky", "One LED hangs elsewhere than in the list.",
+                            {"star": 0.0, "dx_m": 0.01, "dy_m": 0.0}),
+    "new_star": FaultKind("sky", "A light hangs where the list has none.", {"x_m": 0.0, "y_m": 0.0}),
     "stuck_open_valve": FaultKind("valves", "A valve stays open.", {"valve": 0.0}),
     "stuck_closed_valve": FaultKind("valves", "A valve does not open.", {"valve": 0.0}),
     "leaking_valve": FaultKind("valves", "A closed valve leaks.", {"valve": 0.0, "fraction": 0.1}),
@@ -69,7 +73,7 @@ class FaultConfig(BaseModel):
             if name not in known:
                 names = ", ".join(known) or "none"
                 raise ValueError(f"fault {self.kind!r} has no parameter {name!r}; it has {names}")
-        for name, limit in (("valve", 7), ("axis", 1)):
+        for name, limit in (("valve", 7), ("axis", 1), ("star", 99_999)):
             if not 0 <= self.parameters.get(name, 0) <= limit:
                 raise ValueError(f"parameter {name} of fault {self.kind!r} must lie in 0..{limit}")
         if self.end_s <= self.start_s:

@@ -16,6 +16,7 @@ from firmware_emulator.faults import Faults
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
+from firmware_emulator.sky.sky import SkyFaults
 
 Pose = tuple[float, float, float]
 """x, y (m) and heading (rad) of the body origin in the table frame."""
@@ -34,6 +35,7 @@ class Exposure:
         arrival_ns: When the picture reaches the host.
         is_sky_dead: The lights are off.
         false_lights: Lights to add that no catalogue knows.
+        sky_faults: LEDs that differ from the list; None if all hang and shine as listed.
     """
 
     sequence: int
@@ -43,6 +45,7 @@ class Exposure:
     arrival_ns: int
     is_sky_dead: bool
     false_lights: int
+    sky_faults: SkyFaults | None = None
 
 
 class Renderer(Protocol):
@@ -63,7 +66,7 @@ class StarCamera:
         readout_s: From the first row's exposure to the last one's.
         delay_s: From the middle of the exposure until the picture is at the host.
         delay_jitter_s: Its standard deviation.
-        faults: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`.
+        faults: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`, those of the sky.
         rng: For the jitter.
         start_ns: First exposure begins one period later.
     """
@@ -134,10 +137,24 @@ class StarCamera:
             self._last_arrival_ns,
             self._faults.active("dead_sky", age_ns) is not None,
             int(false_lights.parameters["count"]) if false_lights else 0,
+            self._sky_faults(age_ns),
         )
         self._sequence += 1
         if not self._faults.active("silent_camera", age_ns):
             self._pending.append((exposure.arrival_ns, exposure))
+
+    def _sky_faults(self, age_ns: int) -> SkyFaults | None:
+        dead, moved, new = (
+            [fault.parameters for fault in self._faults.all_active(kind, age_ns)]
+            for kind in ("dead_star", "moved_star", "new_star")
+        )
+        if not (dead or moved or new):
+            return None
+        return SkyFaults(
+            tuple(int(row["star"]) for row in dead),
+            tuple((int(row["star"]), row["dx_m"], row["dy_m"]) for row in moved),
+            tuple((row["x_m"], row["y_m"]) for row in new),
+        )
 
     def take(self, until_ns: int) -> list[tuple[int, Exposure]]:
         """Exposures whose pictures reached the host up to `until_ns`."""

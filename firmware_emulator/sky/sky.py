@@ -33,6 +33,21 @@ class Glow:
     brightness: float
 
 
+@dataclass(frozen=True, slots=True)
+class SkyFaults:
+    """What differs from the list of LEDs in one picture.
+
+    Attributes:
+        dead: LEDs that are dark.
+        moved: LEDs with what is added to their places, m.
+        new: Places of lights that no list knows, as bright as a nominal LED.
+    """
+
+    dead: tuple[int, ...] = ()
+    moved: tuple[tuple[int, float, float], ...] = ()
+    new: tuple[tuple[float, float], ...] = ()
+
+
 class Sky:
     """All that shines on the ceiling.
 
@@ -100,21 +115,35 @@ class Sky:
         """Remove all false lights."""
         self._false_xy_m, self._false_brightness = np.empty((0, 2)), np.empty(0)
 
-    def lights(self, stray_per_m2: float = 0.0, *, is_dark: bool = False) -> tuple[Floats, Floats]:
+    def lights(
+        self, stray_per_m2: float = 0.0, *, is_dark: bool = False, faults: SkyFaults | None = None
+    ) -> tuple[Floats, Floats]:
         """All that shines as points.
 
         Args:
             stray_per_m2: Add stray lights of this density. They hang at fixed places, drawn once, and a
                 higher density keeps those of a lower one.
             is_dark: The LEDs are switched off; false and stray lights are not.
+            faults: LEDs that differ from the list; numbers that no LED has are nobody's.
 
         Returns:
             Places (m, 2) and relative brightness (m,).
         """
         shines = np.zeros_like(self.is_dead) if is_dark else ~self.is_dead
         stray = min(_STRAY_RESERVE, round(stray_per_m2 * self._area_m2))
-        places = (self.leds_xy_m[shines], self._false_xy_m, self._stray_xy_m[:stray])
-        brightness = (self.brightness[shines], self._false_brightness, self._stray_brightness[:stray])
+        leds_xy_m, new_xy_m = self.leds_xy_m, np.empty((0, 2))
+        if faults is not None:
+            shines[[led for led in faults.dead if led < len(shines)]] = False
+            leds_xy_m, new_xy_m = leds_xy_m.copy(), np.array(faults.new, dtype=float).reshape(-1, 2)
+            for led, dx_m, dy_m in faults.moved:
+                leds_xy_m[led : led + 1] += (dx_m, dy_m)
+        places = (leds_xy_m[shines], self._false_xy_m, new_xy_m, self._stray_xy_m[:stray])
+        brightness = (
+            self.brightness[shines],
+            self._false_brightness,
+            np.ones(len(new_xy_m)),
+            self._stray_brightness[:stray],
+        )
         return np.concatenate(places), np.concatenate(brightness)
 
     def diffuse_light(self, ceiling_xy_m: Floats) -> Floats:

@@ -18,6 +18,8 @@ STRONGER = {
     "lost_bytes": {"probability_per_byte": 0.05},
     "half_frames": {"probability_per_frame": 0.5},
     "false_lights": {"count": 20},
+    "dead_star": {"star": 31},  # one that the camera sees
+    "moved_star": {"star": 31},
 }
 
 
@@ -71,7 +73,7 @@ def said(arrivals, until_ns=None):
 
 @pytest.mark.parametrize("kind", FAULT_KINDS)
 def test_every_fault_of_the_table_acts_and_only_from_its_start(scene, kind):
-    source = "rendered" if FAULT_KINDS[kind].device == "camera" else "fixes"
+    source = "rendered" if FAULT_KINDS[kind].device in ("camera", "sky") else "fixes"
     fault = {"kind": kind, "vehicle": "alpha", "start_s": START_S, "parameters": STRONGER.get(kind, {})}
     healthy, ill, again = (fly(scene, faults, source) for faults in ([], [fault], [fault]))
     start_ns = round(START_S * S)
