@@ -108,6 +108,8 @@ _ROWS = (
     _row("reference_bytes", m.ReferenceBytes, 100, observers_only=True),
     _row("reference", m.ReferenceState, 100, observers_only=True),
     _row("sky_change", m.SkyChange, 0),
+    _row("star_matches", m.StarMatches, 0),
+    _row("star_picture", m.StarPicture, 0),
     _row("calibration", m.CalibrationInUse, 0, latched=True),
     _row("fusion_calibration", m.FusionCalibration, 0, latched=True),
     _row("diagnostics", m.Diagnostics, 1, scope=Scope.PROCESS),

@@ -30,7 +30,15 @@ from groundstation.messages.operation import (
     SequencePhase,
     VehicleMode,
 )
-from groundstation.messages.stars import FixBytes, SkyChange, StarFix, StarImage, StarSpots
+from groundstation.messages.stars import (
+    FixBytes,
+    SkyChange,
+    StarFix,
+    StarImage,
+    StarMatches,
+    StarPicture,
+    StarSpots,
+)
 
 __all__ = [
     "NO_STOP",
@@ -57,6 +65,8 @@ __all__ = [
     "SkyChange",
     "StarFix",
     "StarImage",
+    "StarMatches",
+    "StarPicture",
     "StarSpots",
     "ValveCommand",
     "ValveDemand",

@@ -28,6 +28,7 @@ _STANDARD = {
     "geometry_msgs/msg/WrenchStamped": _HEADER + "geometry_msgs/Wrench wrench\n",
     "sensor_msgs/msg/Image": _HEADER
     + "uint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n",
+    "sensor_msgs/msg/CompressedImage": _HEADER + "string format\nuint8[] data\n",
 }
 
 

@@ -13,9 +13,11 @@ from groundstation.messages.base import (
     Bool,
     Bytes,
     Float32Array,
+    Float64x3,
     Float64x9,
     Message,
     Text,
+    TextSequence,
 )
 
 
@@ -106,15 +108,15 @@ class FixBytes(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyChange(Message):
-    """A star that died, revived, moved or appeared; the stamp is the exposure that decided.
+    """A star that died or moved or came back, or a light that appeared; stamped by the exposure that decided.
 
     Attributes:
-        change: ``died``, ``revived``, ``moved`` or ``appeared``.
-        star: Id of the catalogue, empty for a light that appeared.
-        x_m: Where it is seen now, or was, in the table frame.
-        y_m: Where it is seen now, or was, in the table frame.
-        place_std: Standard deviation of that place per axis, m.
-        sightings: How many sightings speak for it.
+        change: ``died``, ``revived``, ``moved``, ``returned``, ``appeared`` or ``vanished``.
+        star: Id of the catalogue, empty for a light that is none of its stars.
+        x_m: Where it is seen now, or was last, in the table frame.
+        y_m: Where it is seen now, or was last, in the table frame.
+        place_cov: Covariance of that place: xx, xy, yy in m^2.
+        sightings: How many sightings (of a dead star: misses) speak for it.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/SkyChange"
@@ -122,5 +124,49 @@ class SkyChange(Message):
     star: Text
     x_m: F64
     y_m: F64
-    place_std: F64
+    place_cov: Float64x3
     sightings: U32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StarMatches(Message):
+    """What the star tracker made of one picture: said of refused ones now and then, and on request.
+
+    Attributes:
+        reason: Why there is no fix; empty for a fix.
+        basis: What the stars' places rest on: ``fix``, ``guess`` (the pose that the refused search came
+            nearest to), ``state`` (the filter's), or empty: then there are no stars.
+        x_m: Pose of that basis, NaN without one.
+        y_m: Pose of that basis.
+        heading_rad: Pose of that basis.
+        u_px: Column of each light spot.
+        v_px: Row of each light spot.
+        kind: What each is: 0 a light, 1 a star, 2 no star of the catalogue, 3 a streak.
+        stars: Ids of the stars that the picture should show.
+        star_u_px: Column at which each of them should be.
+        star_v_px: Row at which each of them should be.
+        spot_of_star: Index of the spot that each of them is, 255 for a star not seen.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarMatches"
+    reason: Text
+    basis: Text
+    x_m: F64
+    y_m: F64
+    heading_rad: F64
+    u_px: Float32Array
+    v_px: Float32Array
+    kind: Bytes
+    stars: TextSequence
+    star_u_px: Float32Array
+    star_v_px: Float32Array
+    spot_of_star: Bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StarPicture(Message):
+    """The picture that a ``StarMatches`` of the same stamp speaks of, compressed without loss."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+    format: Text
+    data: Bytes

@@ -40,6 +40,9 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
         ),
         "float_on": Action("valve_writer", (), "switch the float air on"),
         "float_off": Action("valve_writer", (), "cut the float air: the vehicle lands"),
+        "picture": Action(
+            "star_tracker", (), "keep the next picture of the star camera, with its stars named"
+        ),
         "go_to": Action("controller", ("x_m", "y_m", "heading_rad"), "hold another pose"),
     }
 )

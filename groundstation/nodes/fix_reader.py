@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from drivers.reference.protocol import PoseParser
 from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
-from groundstation.messages.definitions import FixBytes, StarFix
+from groundstation.messages.definitions import Ack, FixBytes, Request, StarFix
+from groundstation.nodes import actions
 from groundstation.nodes.node import Node
 
 
@@ -17,8 +18,8 @@ class FixReader(Node):
         stamp_sigma_s: Standard deviation of the stream's ages.
     """
 
-    inputs = (FixBytes,)
-    outputs = (StarFix,)
+    inputs = (FixBytes, Request)
+    outputs = (StarFix, Ack)
 
     def __init__(self, vehicle: str, stamp_sigma_s: float) -> None:
         super().__init__(vehicle)
@@ -26,7 +27,10 @@ class FixReader(Node):
         self._stamp_sigma_s = stamp_sigma_s
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
-        del now_ns
+        if isinstance(message, Request):
+            if actions.is_for(message, "star_tracker"):
+                yield actions.answer(message, now_ns, "its fixes come from a stream: there is no star camera")
+            return
         assert isinstance(message, FixBytes)
         for pose in self._parser.feed(message.data):
             yield StarFix(

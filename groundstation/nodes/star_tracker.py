@@ -1,41 +1,43 @@
 """Star tracker: light spots in, pose of the body or the reason for none out."""
 
 import hashlib
-import math
-from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
-from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import (
+    Ack,
     CalibrationInUse,
+    Request,
     SkyChange,
     StarFix,
+    StarMatches,
     StarSpots,
     VehicleState,
 )
+from groundstation.nodes import actions, star_answers
 from groundstation.nodes.node import Node
-from groundstation.star_tracking import fixes, tracker
+from groundstation.nodes.picture_choice import PictureChoice
+from groundstation.nodes.state_memory import StateMemory
+from groundstation.star_tracking import tracker
 from groundstation.star_tracking.detection import Spots
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior
+from groundstation.star_tracking.fixes import StarFix as Fix
+from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.prior_governor import PriorGovernor
 from groundstation.star_tracking.sky_watch import SkyWatch
 
-MEMORY_NS = 2_000_000_000
-REACH_NS = 50_000_000
-"""Between two states of 100 Hz there are 10 ms; farther than this the IMU has fallen silent."""
-_NO_COVARIANCE = (math.nan,) * 9
+_STILL_M = 1e-3
+"""While its rows are read the picture may move so far; beyond, its lights are no witnesses of places."""
 
 
 class StarTracker(Node):
     """Finds the ceiling in every set of spots, and names stars that died, moved or appeared.
 
-    It starts from a prior where the state is known, else lost in space.
+    It starts from a prior where the state is known, else lost in space. Stars that died or moved are
+    dropped until they are back. Of refused pictures, and when asked, it says which light is what.
 
     Args:
         vehicle: Its name.
@@ -48,8 +50,8 @@ class StarTracker(Node):
         CalibrationFileError: A file is missing or wrong.
     """
 
-    inputs = (StarSpots, VehicleState)
-    outputs = (StarFix, SkyChange, CalibrationInUse)
+    inputs = (StarSpots, VehicleState, Request)
+    outputs = (StarFix, SkyChange, StarMatches, CalibrationInUse, Ack)
 
     def __init__(
         self,
@@ -61,11 +63,12 @@ class StarTracker(Node):
     ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
-        stars, lens = StarCatalogue.load(ceiling), CameraCalibration.load(camera)
-        self._tracker = tracker.StarTracker(stars, lens, settings)
-        self._watch = SkyWatch(stars, lens)
+        self._stars, self._lens = StarCatalogue.load(ceiling), CameraCalibration.load(camera)
+        self._tracker = tracker.StarTracker(self._stars, self._lens, settings)
+        self._watch = SkyWatch(self._stars, self._lens)
         self._governor = PriorGovernor()
-        self._states: deque[VehicleState] = deque()
+        self._states = StateMemory()
+        self._choice = PictureChoice()
         self._stamp_sigma_s = stamp_sigma_s
 
     def start(self, now_ns: int) -> Iterator[Message]:
@@ -75,110 +78,61 @@ class StarTracker(Node):
         yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
-        del now_ns
         match message:
             case VehicleState():
-                self._remember(message)
+                self._states.remember(message)
             case StarSpots(reason="") as spots:
                 yield from self._solve(spots)
             case StarSpots() as spots:
-                yield self._refusal(spots, spots.reason)
+                yield star_answers.refusal_message(spots, spots.reason, self._stamp_sigma_s)
+            case Request() if actions.is_for(message, "star_tracker"):
+                reason = actions.refusal(message)
+                if not reason:
+                    self._choice.ask()
+                yield actions.answer(message, now_ns, reason)
 
     def _solve(self, spots: StarSpots) -> Iterator[Message]:
-        state = self._state_at(spots.stamp_ns)
-        prior = None if state is None else _prior(state, self._stamp_sigma_s)
-        motion = None if state is None else fixes.BodyMotion(*state.velocity_table_m_s, state.rate_rad_s)
-        lights = _spots(spots)
-        answer = self._tracker.solve(lights, self._governor.admit(prior), motion)
-        self._governor.note(answer, prior)
-        if isinstance(answer, fixes.NoFix):
-            yield self._refusal(spots, f"{answer.reason.value}: {answer.detail}")
+        state = self._states.at(spots.stamp_ns)
+        belief = motion = None
+        if state is not None:
+            belief = star_answers.belief_of(state, self._stamp_sigma_s)
+            motion = star_answers.motion_of(state)
+        lights = star_answers.spots_of(spots)
+        answer = self._tracker.solve(lights, self._governor.admit(belief), motion)
+        self._governor.note(answer, belief)
+        if isinstance(answer, NoFix):
+            reason = f"{answer.reason.value}: {answer.detail}"
+            yield star_answers.refusal_message(spots, reason, self._stamp_sigma_s)
+            yield from self._explain(spots, lights, answer, answer.reason.value, reason, belief)
             return
-        yield StarFix(
-            spots.stamp_ns,
-            self.vehicle,
-            True,
-            answer.x_m,
-            answer.y_m,
-            wrap_angle(answer.heading_rad),
-            tuple(answer.cov.ravel().tolist()),
-            self._stamp_sigma_s,
-            answer.stars,
-            answer.mode.value,
-            "",
-        )
-        for found in self._watch.note(answer, lights):
-            yield SkyChange(
-                spots.stamp_ns,
-                self.vehicle,
-                found.change.value,
-                found.star,
-                found.x_m,
-                found.y_m,
-                found.std_m,
-                found.sightings,
-            )
+        yield star_answers.fix_message(spots, answer, self._stamp_sigma_s)
+        yield from self._explain(spots, lights, answer, "", "", belief)
+        if self._is_still(motion):
+            changes = self._watch.note(answer, lights)
+            if changes:
+                self._tracker.drop(self._watch.dropped)
+            for found in changes:
+                yield star_answers.change_message(spots, found)
 
-    def _remember(self, state: VehicleState) -> None:
-        """Keep two seconds of states, none of them of a lost filter."""
-        states = self._states
-        if state.status != "flying":
-            states.clear()
-            return
-        states.append(state)
-        while state.stamp_ns - states[0].stamp_ns > MEMORY_NS:
-            states.popleft()
+    def _explain(
+        self,
+        spots: StarSpots,
+        lights: Spots,
+        answer: Fix | NoFix,
+        kind: str,
+        reason: str,
+        belief: PosePrior | None,
+    ) -> Iterator[StarMatches]:
+        if self._choice.wants(spots.stamp_ns, kind):
+            notes = take_notes(lights, answer, self._lens, self._stars, belief)
+            yield star_answers.matches_message(spots, notes, reason)
 
-    def _state_at(self, stamp_ns: int) -> VehicleState | None:
-        """The state at an exposure: the newest before it carried on, if that is not too far."""
-        before = next((state for state in reversed(self._states) if state.stamp_ns <= stamp_ns), None)
-        if before is None or stamp_ns - before.stamp_ns > REACH_NS:
-            return None
-        span_s = (stamp_ns - before.stamp_ns) * 1e-9
-        (x, y), (vx, vy) = before.position_table_m, before.velocity_table_m_s
-        return replace(
-            before,
-            stamp_ns=stamp_ns,
-            position_table_m=(x + vx * span_s, y + vy * span_s),
-            heading_rad=before.heading_rad + before.rate_rad_s * span_s,
-        )
-
-    def _refusal(self, spots: StarSpots, reason: str) -> StarFix:
-        nowhere = (math.nan,) * 3
-        return StarFix(
-            spots.stamp_ns,
-            self.vehicle,
-            False,
-            *nowhere,
-            _NO_COVARIANCE,
-            self._stamp_sigma_s,
-            0,
-            fixes.Mode.LOST_IN_SPACE.value,
-            reason,
-        )
-
-
-def _prior(state: VehicleState, stamp_sigma_s: float) -> fixes.PosePrior:
-    """What the filter believes of the pose at the exposure, whose stamp is uncertain too."""
-    motion = np.array([*state.velocity_table_m_s, state.rate_rad_s])
-    covariance = np.diag(np.square(state.pose_std)) + stamp_sigma_s**2 * np.outer(motion, motion)
-    return fixes.PosePrior(*state.position_table_m, state.heading_rad, covariance)
-
-
-def _spots(message: StarSpots) -> Spots:
-    def double(values: np.ndarray, *shape: int) -> np.ndarray:
-        return values.astype(np.float64).reshape(shape)
-
-    return Spots(
-        double(message.u_px, -1),
-        double(message.v_px, -1),
-        double(message.flux_dn, -1),
-        double(message.covariance_px2, -1, 3),
-        double(message.elongation, -1),
-        double(message.streak_px, -1, 2),
-        message.background_dn,
-        message.noise_dn,
-        message.hot_pixels,
-        message.cut_by_edge,
-        message.flooded,
-    )
+    def _is_still(self, motion: BodyMotion | None) -> bool:
+        readout_s = self._tracker.settings.readout_s
+        if readout_s == 0.0:
+            return True
+        if motion is None:
+            return False
+        speed_m_s = abs(complex(motion.vx_table_m_s, motion.vy_table_m_s))
+        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.omega_rad_s)
+        return speed_m_s * readout_s < _STILL_M

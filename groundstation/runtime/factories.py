@@ -94,6 +94,14 @@ def spot_finder(rig: Rig, vehicle: str) -> Node:
     return SpotFinder(vehicle)
 
 
+def picture_keeper(rig: Rig, vehicle: str) -> Node:
+    """The last frames, for those that the star tracker speaks of."""
+    from groundstation.nodes.picture_keeper import PictureKeeper  # OpenCV loads only where it is used
+
+    del rig
+    return PictureKeeper(vehicle)
+
+
 def star_tracker(rig: Rig, vehicle: str) -> Node:
     """Identification and pose."""
     from groundstation.nodes.star_tracker import StarTracker  # OpenCV loads only where it is used

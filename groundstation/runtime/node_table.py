@@ -77,6 +77,7 @@ NODES: tuple[NodeRow, ...] = (
     NodeRow("fix_reader", _FLIGHT, Weight.LIGHT, factories.fix_reader, _has_fix_stream),
     NodeRow("spot_finder", _SKY, Weight.HEAVY, factories.spot_finder, _has_camera),
     NodeRow("star_tracker", _SKY, Weight.HEAVY, factories.star_tracker, _has_camera),
+    NodeRow("picture_keeper", _SKY, Weight.HEAVY, factories.picture_keeper, _has_camera),
     NodeRow("fusion", _FLIGHT, Weight.URGENT, factories.fusion),
     NodeRow("controller", _FLIGHT, Weight.LIGHT, factories.controller),
     NodeRow("allocation", _FLIGHT, Weight.LIGHT, factories.allocation),

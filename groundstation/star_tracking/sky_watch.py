@@ -1,55 +1,37 @@
-"""A watchdog of the sky: which stars died, moved or appeared.
+"""A watchdog of the sky: which stars died, moved or came back, and which lights are new.
 
 Every fix says which stars should be in the picture and which were seen. A star's sightings are a coin
 with two sides, alive (seen with probability ``p_seen``) or dead (``p_false``); the log-likelihood ratio
 of the two is summed with a forgetting factor and crosses a threshold either way (Wald's sequential
-test). A star that is seen off its place by more than its noise allows has moved. A light that is no
-star but keeps coming back at one place of the ceiling has appeared and is proposed.
+test). A star that is seen off its place again and again, always at the same other place, has moved.
+Lights that are no stars are followed by ``stray_lights``.
+
+What is dead or has moved is told by ``dropped``; both may come back. A fix of few stars teaches nothing.
 """
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import StarFix
 from groundstation.star_tracking.rays import CeilingRays
+from groundstation.star_tracking.refinement import spot_covariance
 from groundstation.star_tracking.sky_adjustment import project
+from groundstation.star_tracking.sky_change import Change, Place, SkyChange
+from groundstation.star_tracking.stray_lights import StrayLights, StraySettings
 
+Complex = NDArray[np.complex128]
+Index = NDArray[np.int64]
 
-class Change(StrEnum):
-    """What happened to a star."""
-
-    DIED = "died"
-    REVIVED = "revived"
-    MOVED = "moved"
-    APPEARED = "appeared"
-
-
-@dataclass(frozen=True, slots=True)
-class SkyChange:
-    """One finding.
-
-    Attributes:
-        change: What happened.
-        star: Id of the catalogue; empty for a light that appeared.
-        x_m: Where it is seen now (or was, if it died), table.
-        y_m: Where it is seen now (or was, if it died), table.
-        std_m: One sigma of that place per axis.
-        sightings: How many sightings speak for it.
-    """
-
-    change: Change
-    star: str
-    x_m: float
-    y_m: float
-    std_m: float
-    sightings: int
+_NEIGHBOUR_SHARE = 0.4  # of the distance to the next star: a light farther off may be either's
+_SETTLED_SIGHTINGS = 10.0
+_CENTRE_FLOOR_PX = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +44,12 @@ class SkyWatchSettings:
         threshold_nats: Log-likelihood ratio that decides.
         forget: Factor on old evidence per picture.
         margin_px: Stars nearer to the picture's edge are not counted.
-        gate_m: A light this near to a star's place is that star.
+        gate_m: A light this near to a star's place is that star; less where stars hang closer.
         moved_m: A star is not called moved for less.
-        moved_sigmas: Nor within so many sigmas.
-        appear_sightings: A stray light is proposed after so many sightings in one place.
+        moved_sigmas: Nor within so many sigmas of a sighting.
+        moved_sightings: Nor after fewer sightings at its new place.
+        min_stars: Fixes of fewer stars teach nothing.
+        strays: When a light that is no star is proposed.
     """
 
     p_seen: float = 0.9
@@ -76,20 +60,13 @@ class SkyWatchSettings:
     gate_m: float = 0.05
     moved_m: float = 2e-3
     moved_sigmas: float = 6.0
-    appear_sightings: int = 25
-
-
-@dataclass(slots=True)
-class _Stray:
-    """A light that is no star: running mean of its place."""
-
-    place: complex
-    sightings: int
-    quiet: int
+    moved_sightings: int = 12
+    min_stars: int = 5
+    strays: StraySettings = field(default_factory=StraySettings)
 
 
 class SkyWatch:
-    """Watches one ceiling through the fixes of any number of cameras of one kind.
+    """Watches one ceiling through the fixes of one camera.
 
     Args:
         catalogue: The stars.
@@ -109,36 +86,55 @@ class SkyWatch:
         self._rays = CeilingRays(camera)
         self._star_m = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
         self._star = catalogue.x_m + 1j * catalogue.y_m
+        self._tree = cKDTree(self._star_m)
+        apart = np.asarray(self._tree.query(self._star_m, k=2)[0])[:, 1]
+        self._gate_m = np.minimum(self._settings.gate_m, _NEIGHBOUR_SHARE * apart)
         count = len(catalogue)
         self._dead_nats = np.zeros(count)
         self._is_dead = np.zeros(count, dtype=bool)
-        self._has_moved = np.zeros(count, dtype=bool)
         self._missed = np.zeros(count, dtype=np.int64)
+        self._elsewhere: dict[int, Place] = {}  # stars seen off their place
+        self._moved: dict[int, complex] = {}  # stars that are called moved, and the place that was told
+        self._home = np.zeros(count, dtype=np.int64)  # sightings of a moved star at its old place
         self._weight = np.zeros(count)
         self._offset = np.zeros(count, dtype=np.complex128)
         self._square = np.zeros(count)
-        self._strays: list[_Stray] = []
+        self._strays = StrayLights(self._settings.strays)
 
     @property
-    def dead(self) -> NDArray[np.int64]:
+    def dead(self) -> Index:
         """Rows of the catalogue that are called dead."""
         return np.flatnonzero(self._is_dead)
 
+    @property
+    def dropped(self) -> Index:
+        """Rows of the catalogue that no fix should rest on: dead, or not where they should be."""
+        rows = self._is_dead.copy()
+        rows[list(self._moved)] = True
+        return np.flatnonzero(rows)
+
     def note(self, fix: StarFix, spots: Spots) -> list[SkyChange]:
         """Learn from one fix and its spots; give what is newly found."""
+        if fix.stars < self._settings.min_stars or len(spots) == 0:
+            return []
         points = self._rays.look_up(spots.u_px, spots.v_px)
-        where = np.exp(1j * fix.heading_rad) * points.q_body_m + complex(fix.x_m, fix.y_m)
-        distance = np.abs(where[:, None] - self._star[None, :])
-        nearest = distance.argmin(axis=1) if len(where) else np.zeros(0, np.int64)
-        off = distance[np.arange(len(where)), nearest]
-        mine = off < self._settings.gate_m
+        turn = np.exp(1j * fix.heading_rad)
+        where = turn * points.q_body_m + complex(fix.x_m, fix.y_m)
+        off, nearest = self._tree.query(np.stack((where.real, where.imag), axis=1))
+        nearest = np.asarray(nearest, dtype=np.int64)
+        mine = np.asarray(off) < self._gate_m[nearest]
+        cov = spot_covariance(points, spots.cov_px2)
+        arm2 = np.abs(points.q_body_m) ** 2
+        variance = 0.5 * (cov[:, 0, 0] + cov[:, 1, 1] + fix.cov[0, 0] + fix.cov[1, 1]) + arm2 * fix.cov[2, 2]
         changes = self._watch_life(fix, nearest[mine])
-        changes += self._watch_places(where[mine], nearest[mine])
-        return changes + self._watch_strays(where[~mine])
+        changes += self._watch_places(where[mine], nearest[mine], np.sqrt(variance[mine]))
+        return changes + self._strays.note(
+            where[~mine], lambda places: self._shows(fix, places), self._systematic_m2
+        )
 
-    def _watch_life(self, fix: StarFix, seen: NDArray[np.int64]) -> list[SkyChange]:
+    def _watch_life(self, fix: StarFix, seen: Index) -> list[SkyChange]:
         settings = self._settings
-        due = self._due(fix)
+        due = self._shows(fix, self._star)
         was_seen = np.zeros(len(self._star), dtype=bool)
         was_seen[seen] = True
         nats_miss = math.log((1.0 - settings.p_false) / (1.0 - settings.p_seen))
@@ -152,67 +148,80 @@ class SkyWatch:
         died = due & ~self._is_dead & (self._dead_nats > settings.threshold_nats)
         revived = due & self._is_dead & (self._dead_nats < -settings.threshold_nats)
         self._is_dead = (self._is_dead | died) & ~revived
-        found = [self._change(Change.DIED, int(i), int(self._missed[i])) for i in np.flatnonzero(died)]
-        return found + [self._change(Change.REVIVED, int(i), 0) for i in np.flatnonzero(revived)]
+        found = [self._at_home(Change.DIED, int(i), int(self._missed[i])) for i in np.flatnonzero(died)]
+        return found + [self._at_home(Change.REVIVED, int(i), 0) for i in np.flatnonzero(revived)]
 
-    def _watch_places(self, where: NDArray[np.complex128], star: NDArray[np.int64]) -> list[SkyChange]:
+    def _watch_places(self, where: Complex, star: Index, sigma_m: NDArray[np.float64]) -> list[SkyChange]:
         settings = self._settings
         error = where - self._star[star]
-        self._weight[star] = settings.forget * self._weight[star] + 1.0
+        std = np.hypot(sigma_m, self._catalogue.std_m[star])
+        limit = np.maximum(settings.moved_m, settings.moved_sigmas * std)
+        is_off = np.abs(error) > limit
+        self._average(star[~is_off], error[~is_off])
+        found = []
+        for row in star[~is_off].tolist():
+            if row in self._elsewhere:
+                del self._elsewhere[row]
+            if row in self._moved:
+                self._home[row] += 1
+                if self._home[row] >= settings.moved_sightings:
+                    del self._moved[row]
+                    found.append(self._at_home(Change.RETURNED, row, int(self._home[row])))
+        for row, at, gate in zip(star[is_off].tolist(), where[is_off], limit[is_off], strict=True):
+            self._home[row] = 0
+            place = self._elsewhere.get(row)
+            if place is None or abs(place.mean - at) > gate:
+                self._elsewhere[row] = Place(complex(at))
+                continue
+            place.add(complex(at))
+            told = self._moved.get(row)
+            is_news = told is None or abs(place.mean - told) > gate
+            if is_news and place.sightings >= settings.moved_sightings:
+                self._moved[row] = place.mean
+                name, cov = self._catalogue.ids[row], place.cov_m2(self._systematic_m2())
+                found.append(
+                    SkyChange(Change.MOVED, name, place.mean.real, place.mean.imag, cov, place.sightings)
+                )
+        return found
+
+    def _average(self, star: Index, error: Complex) -> None:
+        """Keep each star's mean offset and its scatter, old sightings forgotten."""
+        self._weight[star] = self._settings.forget * self._weight[star] + 1.0
         share = 1.0 / self._weight[star]
         before = self._offset[star]
         self._offset[star] = before + share * (error - before)
         self._square[star] += share * (np.abs(error - before) ** 2 - self._square[star])
-        found = []
-        for row in np.unique(star):
-            weight = float(self._weight[row])
-            shift = complex(self._offset[row])
-            std = math.sqrt(0.5 * float(self._square[row]) / max(weight, 1.0))
-            far = weight > 10.0 and abs(shift) > max(settings.moved_m, settings.moved_sigmas * std)
-            if far and not self._has_moved[row]:
-                place = complex(self._star[row]) + shift
-                name = self._catalogue.ids[int(row)]
-                found.append(SkyChange(Change.MOVED, name, place.real, place.imag, std, int(weight)))
-            self._has_moved[row] = far
-        return found
 
-    def _watch_strays(self, where: NDArray[np.complex128]) -> list[SkyChange]:
-        settings = self._settings
-        found = []
-        for stray in self._strays:
-            stray.quiet += 1
-        for place in where:
-            near = [stray for stray in self._strays if abs(stray.place - place) < 0.3 * settings.gate_m]
-            if not near:
-                self._strays.append(_Stray(complex(place), 1, 0))
-                continue
-            stray = near[0]
-            stray.sightings += 1
-            stray.quiet = 0
-            stray.place += (complex(place) - stray.place) / stray.sightings
-            if stray.sightings == settings.appear_sightings:
-                std = self._rays.scale_m_px * 0.1
-                found.append(
-                    SkyChange(Change.APPEARED, "", stray.place.real, stray.place.imag, std, stray.sightings)
-                )
-        self._strays = [s for s in self._strays if s.quiet < 20 * s.sightings]
-        return found
+    def _systematic_m2(self) -> float:
+        """Variance per axis of a mean place that no averaging takes away.
 
-    def _due(self, fix: StarFix) -> NDArray[np.bool_]:
-        """Tell which stars should be inside the picture."""
-        pose = np.array([[fix.x_m, fix.y_m, fix.heading_rad]])
-        near = np.abs(self._star - complex(fix.x_m, fix.y_m)) < self._rays.reach_m
-        due = np.zeros(len(self._star), dtype=bool)
-        rows = np.flatnonzero(near)
+        It is what the stars' own mean offsets scatter beyond their noise: lens, catalogue, level.
+        """
+        floor = (_CENTRE_FLOOR_PX * self._rays.scale_m_px) ** 2
+        known = self._weight > _SETTLED_SIGHTINGS
+        if int(known.sum()) < self._settings.min_stars:
+            return floor + float(np.median(self._catalogue.std_m)) ** 2
+        spread = 0.5 * float(np.mean(np.abs(self._offset[known]) ** 2))
+        noise = 0.5 * float(np.mean(self._square[known] / self._weight[known]))
+        return floor + max(spread - noise, 0.0)
+
+    def _shows(self, fix: StarFix, places: Complex) -> NDArray[np.bool_]:
+        """Tell which places of the ceiling lie well inside the picture."""
+        inside = np.abs(places - complex(fix.x_m, fix.y_m)) < self._rays.reach_m
+        rows = np.flatnonzero(inside)
         if len(rows) == 0:
-            return due
-        pixel, _ = project(self._camera, np.repeat(pose, len(rows), axis=0), self._star_m[rows])
+            return inside
+        pose = np.broadcast_to([fix.x_m, fix.y_m, fix.heading_rad], (len(rows), 3))
+        at = np.stack((places[rows].real, places[rows].imag), axis=1)
+        pixel, _ = project(self._camera, pose, at)
         margin = self._settings.margin_px
         size = np.array([self._camera.width - 1.0, self._camera.height - 1.0])
-        due[rows] = ((pixel > margin) & (pixel < size - margin)).all(axis=1)
-        return due
+        inside[rows] = ((pixel > margin) & (pixel < size - margin)).all(axis=1)
+        return inside
 
-    def _change(self, change: Change, row: int, sightings: int) -> SkyChange:
+    def _at_home(self, change: Change, row: int, sightings: int) -> SkyChange:
         x, y = self._star_m[row]
-        std = float(self._catalogue.std_m[row])
-        return SkyChange(change, self._catalogue.ids[row], float(x), float(y), std, sightings)
+        variance = float(self._catalogue.std_m[row]) ** 2
+        return SkyChange(
+            change, self._catalogue.ids[row], float(x), float(y), (variance, 0.0, variance), sightings
+        )
