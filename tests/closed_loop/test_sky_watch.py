@@ -1,38 +1,68 @@
-"""The station's star list differs from the ceiling that hangs there: the watchdog of the sky must say so."""
+"""LEDs of the emulated ceiling die, move and appear in flight: the station names them and flies on."""
 
+import csv
 import math
 from pathlib import Path
 
 import pytest
 
 from groundstation.messages import definitions as m
-from groundstation.runtime.lockstep_run import make_runner
-from groundstation.runtime.rig import parse_rig
 
-RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
-CEILING = RIG.parents[2] / "calibration" / "rigs" / "emulated" / "ceiling.csv"
+CEILING = Path(__file__).parents[2] / "calibration" / "rigs" / "emulated" / "ceiling.csv"
+FAULT = """
+[[laboratory.faults]]
+kind = "{kind}"
+vehicle = "alpha"
+start_s = {start_s}
+end_s = {end_s}
+parameters = {{ {parameters} }}
+"""
+NEW_M = (0.33, 0.21)
+SHIFT_M = (0.011, -0.006)
+
+
+def stars_over_the_start():
+    """Rows of the star list by their distance from where the mock-up stands: all are in the picture."""
+    with CEILING.open(newline="") as file:
+        rows = [
+            (i, row["id"], float(row["x_m"]), float(row["y_m"])) for i, row in enumerate(csv.DictReader(file))
+        ]
+    return sorted(rows, key=lambda row: math.hypot(*row[2:]))
+
+
+def fault(kind, start_s, end_s="inf", **parameters):
+    words = ", ".join(f"{name} = {value}" for name, value in parameters.items())
+    return FAULT.format(kind=kind, start_s=start_s, end_s=end_s, parameters=words)
 
 
 @pytest.mark.slow
-def test_a_star_too_many_is_dead_and_a_star_too_few_has_appeared(tmp_path):
-    header, *rows = CEILING.read_text().splitlines()
-    near = sorted(rows, key=lambda row: math.hypot(*map(float, row.split(",")[1:])))
-    missing = near[3]
-    _, x_m, y_m = missing.split(",")
-    listed = [row for row in rows if row != missing]
-    ceiling = tmp_path / "ceiling.csv"
-    ceiling.write_text("\n".join([header, *listed, "900,0.33,0.21"]) + "\n")
-    station, laboratory = RIG.read_text().split("[laboratory]", 1)
-    station = station.replace("../../calibration/rigs/emulated/ceiling.csv", str(ceiling))
-    found = []
-
-    def observe(delivered, now_ns):
-        if isinstance(delivered.payload, m.SkyChange):
-            found.append(delivered.payload)
-
-    runner = make_runner(parse_rig(station + "[laboratory]" + laboratory, RIG.resolve()), 1, [observe])
-    runner.run(7_000_000_000)
-    runner.close()
-    assert {(change.change, change.star) for change in found} == {("died", "900"), ("appeared", "")}
-    new = next(change for change in found if change.change == "appeared")
-    assert math.hypot(new.x_m - float(x_m), new.y_m - float(y_m)) < 1e-3
+def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly):
+    dead, moved = stars_over_the_start()[2:4]
+    flight = fly(
+        fault("dead_star", 3.0, 6.0, star=dead[0])
+        + fault("moved_star", 3.0, 6.0, star=moved[0], dx_m=SHIFT_M[0], dy_m=SHIFT_M[1])
+        + fault("new_star", 3.0, 7.0, x_m=NEW_M[0], y_m=NEW_M[1]),
+        rig="late_pipeline",
+    ).run(10.0)
+    changes = flight.of(m.SkyChange)
+    assert all(change.stamp_ns > 3_000_000_000 for change in changes)
+    first = {}
+    for change in changes:
+        first.setdefault((change.change, change.star), change)
+    assert set(first) == {
+        ("died", dead[1]),
+        ("revived", dead[1]),
+        ("moved", moved[1]),
+        ("returned", moved[1]),
+        ("appeared", ""),
+        ("vanished", ""),
+    }
+    place = first["moved", moved[1]]
+    assert math.hypot(place.x_m - moved[2] - SHIFT_M[0], place.y_m - moved[3] - SHIFT_M[1]) < 3e-4
+    new = first["appeared", ""]
+    assert math.hypot(new.x_m - NEW_M[0], new.y_m - NEW_M[1]) < 3e-4
+    assert new.sightings == 25
+    assert 0.0 < new.place_cov[0] < 1e-7
+    assert all(fix.fix for fix in flight.of(m.StarFix))
+    mode_of = {fix.mode for fix in flight.of(m.StarFix, start_s=5.0)}
+    assert mode_of == {"tracking", "lost-in-space"}
