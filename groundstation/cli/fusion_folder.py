@@ -24,10 +24,11 @@ STAR_COLUMNS = ("t_exposure_s", "t_arrival_s", "x_m", "y_m", "heading_rad")
 POSITIVE_KEYS = (
     "duration_s", "imu_rate_hz", "poll_rate_hz", "star_sigma_xy_m", "star_sigma_heading_rad",
 )  # fmt: skip
-FIX_TIME_SIGMA_S = 1e-3
-"""Two devices' stamps agree no better; the data sets do not say."""
-FIX_DELAY_SIGMA_S = 5e-4
-"""Constant part of it: half a poll of a 1 kHz sensor is the best that a delay's calibration can promise."""
+FIX_TIME_POLLS = 1.0
+"""How well an exposure's stamp can be laid on the packets: nothing happens between two polls of the sensors.
+Data sets do not say it; live, the clock's own sigma goes into each fix's covariance instead."""
+FIX_DELAY_POLLS = 0.5
+"""The constant part of it: what the best calibration of a camera's delay leaves."""
 OTHER_KEYS = (
     "run_start_s", "imu_offset_sigma_m", "gyro_noise_poll_rad_s", "acc_noise_poll_m_s2", "gyro_lsb_rad_s",
     "acc_lsb_m_s2", "gyro_tempco_rad_s_C", "acc_tempco_m_s2_C", "gyro_bandwidth_hz", "acc_bandwidth_hz",
@@ -71,8 +72,8 @@ def noise_of(known: dict[str, Any]) -> NoiseModel:
         acc_density_m_s2_rthz=packet_density(known["acc_noise_poll_m_s2"], known["acc_lsb_m_s2"], poll),
         star_sigma_xy_m=known["star_sigma_xy_m"],
         star_sigma_heading_rad=known["star_sigma_heading_rad"],
-        fix_time_sigma_s=FIX_TIME_SIGMA_S,
-        fix_delay_sigma_s=FIX_DELAY_SIGMA_S,
+        fix_time_sigma_s=FIX_TIME_POLLS / poll,
+        fix_delay_sigma_s=FIX_DELAY_POLLS / poll,
         imu_offset_x_m=known["imu_offset_m"][0],
         imu_offset_y_m=known["imu_offset_m"][1],
         imu_offset_sigma_m=known["imu_offset_sigma_m"],

@@ -61,11 +61,14 @@ class Flight:
 
 @pytest.fixture
 def fly():
-    """Makes flights of an example rig with lines added; they are closed at the end of the test."""
+    """Makes flights of an example rig with lines changed or added; they are closed at the end of the test."""
     flights = []
 
-    def make(more="", *, rig="drawn_fixes", seed=1, short_rest=True):
+    def make(more="", *, rig="drawn_fixes", seed=1, short_rest=True, changes=()):
         text = (RIGS / f"{rig}.toml").read_text()
+        for old, new in changes:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
         flight = Flight(text + (SHORT_REST if short_rest else "") + more, seed)
         flights.append(flight)
         return flight

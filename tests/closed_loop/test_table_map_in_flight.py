@@ -1,0 +1,135 @@
+"""A table that is out of level and wavy, with its map and without: what the map is worth in flight."""
+
+import importlib.util
+import math
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from calibration.table.table_map import MapProvenance, TableMap
+from drivers.laboratory import load_laboratory
+from firmware_emulator.plant.air_table import Surface
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.topics import topic_of
+from groundstation.cli.calibrate import app
+from groundstation.messages import definitions as m
+from groundstation.recording.writer import Recorder
+from groundstation.runtime.provenance import recording_info
+from groundstation.runtime.rig import load_rig
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SURFACE = "tilt_rad = [0.0003, -0.0001]"
+WAVY = (SURFACE, f"{SURFACE}\nwaviness_rad = 5e-5\nwaviness_length_m = 0.8")
+GOES = ("[vehicles.alpha]", '[mock_ups.standard.control]\ncontroller = "go_to"\n\n[vehicles.alpha]')
+LEG_S, OUTAGE_S = 18.0, 10.0
+POSES = ((1.0, -0.6, 0.8), (-1.0, -0.6, 1.6), (1.0, 0.7, 2.4), (-0.9, 0.8, 3.0))
+
+
+def true_map(rig, seed, path):
+    """Write the map that a perfect survey of the emulated table would have made."""
+    laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
+    table = laboratory.config.table
+    rng = np.random.default_rng(laboratory._seeds(0, 0, 0))
+    surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
+    x, y = np.arange(-2.0, 2.01, 0.05), np.arange(-1.5, 1.51, 0.05)
+    pull = np.array([[surface.slope_acceleration(a, b) for a in x] for b in y])
+    std, mean = np.full(pull.shape[:2], 5e-5), pull.reshape(-1, 2).mean(axis=0)
+    made = TableMap(
+        -2.0, -1.5, 0.05, pull[..., 0], pull[..., 1], std, std, np.zeros_like(std),
+        (float(mean[0]), float(mean[1])), 1e-9 * np.eye(2), 3e-4,
+        MapProvenance(datetime(2026, 1, 1, tzinfo=UTC), {"truth": "0" * 64}, 1.0, 1.0),
+    )  # fmt: skip
+    made.save(path)
+
+
+def tour(fly, legs, seed, table_map=None):
+    """Fly from pose to pose, each leg with an outage of the sky.
+
+    Returns:
+        Distances of estimate and truth at the end of each outage (m), and the summed on-times of all valves.
+    """
+    table = [] if table_map is None else [("y_max_m = 1.5", f'y_max_m = 1.5\nmap = "{table_map}"')]
+    begin_s = 4.0
+    ends = [begin_s + LEG_S * leg + 6.0 + OUTAGE_S for leg in range(legs)]
+    dark = "".join(
+        '\n[[laboratory.faults]]\nkind = "dead_sky"\nvehicle = "alpha"\n'
+        f"start_s = {end - OUTAGE_S}\nend_s = {end}\n"
+        for end in ends
+    )
+    flight = fly(dark, seed=seed, changes=[WAVY, GOES, *table]).run(begin_s)
+    for leg in range(legs):
+        request = m.Request(flight.runner.now_ns, "alpha", leg + 1, "tour", "go_to", POSES[leg])
+        envelope = Envelope(topic_of(m.Request), "tour", leg + 1, flight.runner.now_ns)
+        flight.runner._publish([Delivered(envelope, request)])
+        flight.run(LEG_S)
+    errors = []
+    for end in ends:
+        state, truth = flight.of(m.VehicleState, stop_s=end)[-1], flight.of(m.ReferenceState, stop_s=end)[-1]
+        age_s = (truth.stamp_ns - state.stamp_ns) * 1e-9
+        reached = np.add(state.position_table_m, np.multiply(age_s, state.velocity_table_m_s))
+        errors.append(math.dist(reached, truth.position_table_m))
+    on_ms = sum(sum(demand.on_time_ms) for demand in flight.of(m.ValveDemand, start_s=begin_s))
+    return np.array(errors), 1e-3 * on_ms, flight
+
+
+@pytest.mark.slow
+def test_with_the_true_map_an_outage_ends_nearer_to_the_truth(fly, tmp_path):
+    path, seed = tmp_path / "map.toml", 3
+    true_map(fly(seed=seed, changes=[WAVY]).rig, seed, path)
+    without, _, _ = tour(fly, 1, seed)
+    with_map, _, flight = tour(fly, 1, seed, path)
+    assert with_map[0] < 0.4 * without[0]
+    # what the filter still finds beyond a true map is little
+    left = flight.of(m.FusionStatus)[-1].slope_left_m_s2
+    assert math.hypot(*left) < 5e-4
+
+
+def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(fly, tmp_path):
+    path, seed = tmp_path / "map.toml", 5
+    true_map(fly(seed=seed, changes=[WAVY]).rig, seed, path)
+    table = ("y_max_m = 1.5", f'y_max_m = 1.5\nmap = "{path}"')
+    here = (
+        "hold = { x_m = 0.2, y_m = 0.1, heading_deg = 0.0 }",
+        "hold = { x_m = 0.0, y_m = 0.0, heading_deg = 5.0 }",
+    )
+    flight = fly(seed=seed, changes=[WAVY, here, table]).run(3.0)
+    (said,) = flight.of(m.FusionCalibration)
+    assert said.names == ("table.map",)
+    assert said.contents == (path.read_text(),)
+    pull = TableMap.load(path).acceleration_m_s2(0.0, 0.0)
+    first = flight.of(m.Wrench)[0]
+    turn = math.radians(5.0)
+    force = (
+        math.cos(turn) * first.force_x_n - math.sin(turn) * first.force_y_n,
+        math.sin(turn) * first.force_x_n + math.cos(turn) * first.force_y_n,
+    )
+    assert np.allclose(force, np.multiply(-flight.rig.mock_ups["standard"].mass_kg, pull), atol=4e-3)
+
+
+@pytest.mark.slow
+def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end_nearer(
+    fly, tmp_path, monkeypatch
+):
+    seed = 3
+    spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
+    survey_laps = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "survey_laps", survey_laps)
+    spec.loader.exec_module(survey_laps)
+    rig_path, laps, made = (
+        EXAMPLES / "rigs" / "survey_laps.toml",
+        tmp_path / "laps.mcap",
+        tmp_path / "map.toml",
+    )
+    rig = load_rig(rig_path)
+    with Recorder(laps, recording_info(rig, rig_path, seed, None)) as recorder:
+        survey_laps.fly(rig, 300.0, [recorder.record], seed)
+    result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
+    assert result.exit_code == 0, result.output
+    without, gas_without, _ = tour(fly, 4, seed)
+    with_map, gas_with, _ = tour(fly, 4, seed, made)
+    assert np.sqrt((with_map**2).mean()) < 0.5 * np.sqrt((without**2).mean())
+    assert gas_with < 0.97 * gas_without
