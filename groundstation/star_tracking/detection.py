@@ -2,16 +2,18 @@
 
 A spot is a group of neighbouring pixels whose smoothed level stands out of the noise. Hot pixels
 (one pixel holds nearly all of the light) and spots cut by the edge of the picture are dropped and
-counted. Centres come from ``spot_fit``.
+counted. Centres come from ``spot_fit``. All of it exists twice: in the compiled core, and in NumPy.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.core.library import Core, default_core
 from groundstation.star_tracking.background import WEIGHT_SUM, Levels, measure_levels
+from groundstation.star_tracking.detection_core import CoreDetector
 from groundstation.star_tracking.spot_fit import SpotPixels, fit_spots
 
 
@@ -75,10 +77,49 @@ class Spots:
 
 
 _GROW = np.ones((3, 3), np.uint8)
+_MAX_GROUPS = 20_000  # with more of them the picture is flooded
+
+
+class Detector:
+    """Finds the light spots of grey pictures; keeps its memory between pictures, one thread at a time.
+
+    Args:
+        settings: What counts as a spot.
+        core: Compiled core or ``PURE``; the default is the compiled one where there is one. Both give
+            the same spots, their figures within rounding.
+    """
+
+    def __init__(self, settings: DetectorSettings | None = None, core: Core | None = None) -> None:
+        self._settings = settings or DetectorSettings()
+        core = core or default_core()
+        self._compiled = CoreDetector(core, **asdict(self._settings)) if core.is_compiled else None
+
+    def find(self, image: NDArray[np.uint8]) -> Spots:
+        """Find the light spots of a grey picture.
+
+        Args:
+            image: Picture (h, w), uint8.
+
+        Raises:
+            PictureError: The array is not a grey 8-bit picture of at least 32 x 32 pixels.
+        """
+        _check(image)
+        if self._compiled is None:
+            return _find(image, self._settings)
+        fitted, summary = self._compiled.find(image)
+        u, v, flux, *_, elongation, _, _ = fitted.T.copy()
+        return Spots(
+            *(u, v, flux, fitted[:, 3:6].copy(), elongation, fitted[:, 7:9].copy()),
+            summary.background_dn,
+            summary.noise_dn,
+            summary.hot_pixels,
+            summary.cut_by_edge,
+            bool(summary.is_flooded),
+        )
 
 
 def detect(image: NDArray[np.uint8], settings: DetectorSettings | None = None) -> Spots:
-    """Find the light spots of a grey picture.
+    """Find the light spots of one picture; for many, keep a ``Detector``.
 
     Args:
         image: Picture (h, w), uint8.
@@ -87,22 +128,27 @@ def detect(image: NDArray[np.uint8], settings: DetectorSettings | None = None) -
     Raises:
         PictureError: The array is not a grey 8-bit picture of at least 32 x 32 pixels.
     """
-    settings = settings or DetectorSettings()
-    _check(image)
+    return Detector(settings).find(image)
+
+
+def _find(image: NDArray[np.uint8], settings: DetectorSettings) -> Spots:
     levels = measure_levels(image)
     mask = cv2.compare(levels.smooth, levels.threshold(settings.threshold_sigmas), cv2.CMP_GT)
     lit = cv2.countNonZero(mask)
     if lit == 0:
         return _nothing(levels)
-    if lit > settings.max_lit_ratio * mask.size:
+    if lit > int(settings.max_lit_ratio * mask.size):
         return _nothing(levels, is_flooded=True)
-    count, labels = cv2.connectedComponentsWithAlgorithm(mask, 8, cv2.CV_16U, cv2.CCL_BBDT)
-    grown = cv2.dilate(np.asarray(labels), _GROW)
-    pixels = _gather(image, levels, np.asarray(grown), count - 1, settings)
+    # This algorithm numbers groups by their first pixel in reading order, as the core does.
+    count, labels = cv2.connectedComponentsWithAlgorithm(mask, 8, cv2.CV_32S, cv2.CCL_SAUF)
+    if count - 1 > _MAX_GROUPS:
+        return _nothing(levels, is_flooded=True)
+    grown = np.asarray(cv2.dilate(np.asarray(labels, dtype=np.uint16), _GROW), dtype=np.uint16)
+    pixels = _gather(image, levels, grown, count - 1, settings)
     spots_kept, hot, cut = _judge(pixels, image.shape, settings)
     if not spots_kept.any():
         return _nothing(levels, hot=hot, cut=cut)
-    fitted = fit_spots(pixels.keep(_brightest(pixels, spots_kept, settings.max_spots)))
+    fitted = fit_spots(pixels.keep(spots_kept))
     order = np.argsort(-fitted.flux_dn, kind="stable")
     return Spots(
         u_px=fitted.u_px[order],
@@ -152,23 +198,20 @@ def _gather(
     settings: DetectorSettings,
 ) -> SpotPixels:
     """Collect the pixels of every label, sorted by label."""
-    where = np.flatnonzero((labels != 0).ravel())
+    where = np.flatnonzero(labels.ravel())
     label = labels.ravel()[where]
     order = np.argsort(label, kind="stable")  # radix sort: linear for 16-bit keys
     where = where[order]
-    size = np.bincount(label, minlength=count + 1)[1:]
-    raw = image.ravel()[where]
-    background = levels.background.ravel()[where].astype(np.float64) * (1.0 / WEIGHT_SUM)
+    raw = image.ravel()[where].astype(np.int64)
+    background = levels.background.ravel()[where].astype(np.int64)
     row = where // image.shape[1]
     return SpotPixels(
         u_px=(where - row * image.shape[1]).astype(np.float64),
         v_px=row.astype(np.float64),
-        light_dn=raw - background,
-        variance_dn2=np.asarray(
-            levels.variance_floor_dn2 + levels.variance_slope_dn * background, np.float64
-        ),
+        light_dn=(WEIGHT_SUM * raw - background) / WEIGHT_SUM,
+        variance_dn2=levels.variance_floor_dn2 + levels.variance_slope_dn * (background / WEIGHT_SUM),
         is_saturated=raw >= settings.saturation_dn,
-        size=size[size > 0],
+        size=np.bincount(label, minlength=count + 1)[1:],
         gain_dn_per_electron=settings.gain_dn_per_electron,
     )
 
@@ -176,22 +219,16 @@ def _gather(
 def _judge(
     pixels: SpotPixels, shape: tuple[int, ...], settings: DetectorSettings
 ) -> tuple[NDArray[np.bool_], int, int]:
-    """Say which groups are spots; count hot pixels and those cut by the edge."""
+    """Say which groups are spots, the brightest so many; count hot pixels and those cut by the edge."""
     starts = pixels.starts
-    total = np.add.reduceat(pixels.light_dn, starts)
-    peak = np.maximum.reduceat(pixels.light_dn, starts)
-    hot = peak > settings.hot_pixel_ratio * total
+    light = np.rint(WEIGHT_SUM * pixels.light_dn)  # whole numbers: sums and comparisons are exact
+    total = np.add.reduceat(light, starts)
+    hot = np.maximum.reduceat(light, starts) > settings.hot_pixel_ratio * total
     cut = np.minimum.reduceat(pixels.u_px, starts) <= 0
     cut |= np.maximum.reduceat(pixels.u_px, starts) >= shape[1] - 1
     cut |= np.minimum.reduceat(pixels.v_px, starts) <= 0
     cut |= np.maximum.reduceat(pixels.v_px, starts) >= shape[0] - 1
-    return ~hot & ~cut & (total > 0.0), int(hot.sum()), int((cut & ~hot).sum())
-
-
-def _brightest(pixels: SpotPixels, kept: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    if int(kept.sum()) <= count:
-        return kept
-    total = np.where(kept, np.add.reduceat(pixels.light_dn, pixels.starts), -np.inf)
-    chosen = np.zeros_like(kept)
-    chosen[np.argsort(-total, kind="stable")[:count]] = True
-    return chosen
+    kept = ~hot & ~cut & (total > 0.0)
+    brightest = np.argsort(np.where(kept, -total, np.inf), kind="stable")
+    kept[brightest[settings.max_spots :]] = False
+    return kept, int(hot.sum()), int((cut & ~hot).sum())

@@ -1,0 +1,40 @@
+/* Sub-pixel centres of light spots; see spot_fit.c. */
+#ifndef GROUNDSTATION_SPOT_FIT_H
+#define GROUNDSTATION_SPOT_FIT_H
+
+#include "core.h"
+
+/* Pixels of all spots in one row, spot after spot. */
+typedef struct {
+    double *u_px, *v_px;
+    double *light_dn;     /* above the background */
+    double *variance_dn2; /* without the star's own shot noise */
+    double *usable;       /* 0 where saturated, else 1 */
+} SpotPixels;
+
+/* A symmetric 2x2 matrix. */
+typedef struct {
+    double uu, uv, vv;
+} Symmetric;
+
+/* What is handed out: 9 doubles a spot. */
+typedef struct {
+    double u_px, v_px, flux_dn;
+    Symmetric cov_px2;
+    double elongation;
+    double streak_u_px, streak_v_px;
+} FittedSpot;
+
+typedef struct {
+    int32_t first, size; /* its pixels */
+    double u_px, v_px, flux_dn;
+    Symmetric spread_px2, cov_px2; /* second moments; covariance of the centre */
+    Symmetric shape_px2;           /* of the Gaussian that is fitted */
+} Spot;
+
+/* Fit the centre and light of `count` spots whose first and size are given, brightest first into `fitted`;
+ * `work` has room for `count` doubles. */
+void fit_spots(const SpotPixels *pixels, double gain_dn_per_electron, Spot *spots, int32_t count, double *work,
+               FittedSpot *fitted);
+
+#endif

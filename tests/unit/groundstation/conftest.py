@@ -1,0 +1,16 @@
+"""The compiled core for tests: that of the tree, or a fresh one where that is stale."""
+
+import pytest
+
+from groundstation.core.build import CoreBuildError, compile_core, is_fresh
+from groundstation.core.library import load_core
+
+
+@pytest.fixture(scope="session")
+def compiled_core(tmp_path_factory):
+    if is_fresh():
+        return load_core()
+    try:
+        return load_core(compile_core(tmp_path_factory.mktemp("core") / "core.so"))
+    except CoreBuildError as error:
+        pytest.skip(f"no compiled core to test: {error}")
