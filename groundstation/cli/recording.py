@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from groundstation.bus.topics import topic_named
+from groundstation.cli import recording_pictures
 from groundstation.cli.errors import UsageError
 from groundstation.recording.causes import CauseIndex, Reference
 from groundstation.recording.errors import RecordingError
@@ -19,6 +20,7 @@ from groundstation.recording.recover import recover as recover_file
 from groundstation.recording.writer import PART_SUFFIX
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+app.command()(recording_pictures.pictures)
 
 
 @app.callback()

@@ -1,10 +1,12 @@
 """Files of the star-tracker commands: frames in, tables out; every refusal is one sentence."""
 
 import csv
+import errno
 import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
@@ -110,6 +112,38 @@ def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:
     return anchors
 
 
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Give an empty folder whose files come to ``path`` when all has gone well, and nowhere otherwise.
+
+    Files that are there already stay, unless they have the name of a new one.
+
+    Raises:
+        UsageError: The folder cannot be made, or a file is in its place.
+    """
+    try:
+        if path.exists() and not path.is_dir():
+            raise FileExistsError(errno.EEXIST, "a file is in its place")
+        made = tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise UsageError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
+    with made as unfinished:
+        yield Path(unfinished)
+        path.mkdir(exist_ok=True)
+        for file in sorted(Path(unfinished).iterdir()):
+            file.replace(path / file.name)
+
+
+def write_picture(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write a picture as PNG, whole or not at all.
+
+    Raises:
+        UsageError: The file cannot be written.
+    """
+    _, data = cv2.imencode(".png", image)
+    _write(path, data.tobytes())
+
+
 def check_targets(*paths: Path | None) -> None:
     """Refuse targets that cannot be written before any work is done.
 
@@ -131,13 +165,17 @@ def write_atomically(path: Path, text: str) -> None:
     Raises:
         UsageError: The folder does not exist or cannot be written.
     """
+    _write(path, text.encode())
+
+
+def _write(path: Path, data: bytes) -> None:
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror or error}).") from error
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except OSError as error:

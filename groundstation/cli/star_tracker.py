@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -24,9 +25,11 @@ from groundstation.cli.star_files import (
     find_frames,
     read_anchors,
     read_frame,
+    whole_folder,
     with_progress,
     write_atomically,
 )
+from groundstation.cli.star_pictures import PictureFolder
 from groundstation.cli.star_plots import plot_residuals
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
@@ -78,6 +81,12 @@ def solve(
     folder: Annotated[Path, typer.Argument(help="With ceiling.csv, camera.json and frames/.")],
     out: Annotated[Path, typer.Option(help="CSV to write, one row per frame.")],
     method: Annotated[Method, typer.Option(help="Star identification.")] = Method.DEFAULT,
+    pictures: Annotated[
+        Path | None, typer.Option(help="Folder for the refused frames, lights ringed and stars named (PNG).")
+    ] = None,
+    every_picture: Annotated[
+        bool, typer.Option("--every-picture", help="With --pictures: all frames, not only refused ones.")
+    ] = False,
 ) -> None:
     """Solve every frame of a folder on its own, lost in space.
 
@@ -88,17 +97,27 @@ def solve(
     check_targets(out)
     camera, catalogue = load_sky(folder)
     frames = find_frames(folder)
+    if every_picture and pictures is None:
+        raise UsageError("--every-picture needs --pictures, the folder for them.")
     solver = _solver(method, camera, catalogue)
     solver(np.zeros((camera.height, camera.width), np.uint8))  # the first call pays for lazy imports
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for path in with_progress(frames, "solving"):
-        image = read_frame(path, camera)
-        begin = time.process_time()
-        answer = solver(image)
-        writer.writerow(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))
-    write_atomically(out, buffer.getvalue())
+    with ExitStack() as stack:
+        drawn = None
+        if pictures is not None:
+            drawn = PictureFolder(
+                stack.enter_context(whole_folder(pictures)), camera, catalogue, every_picture
+            )
+        for path in with_progress(frames, "solving"):
+            image = read_frame(path, camera)
+            begin = time.process_time()
+            answer = solver(image)
+            writer.writerow(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))
+            if drawn is not None:
+                drawn.note(path.stem, image, answer)
+        write_atomically(out, buffer.getvalue())
 
 
 @app.command()

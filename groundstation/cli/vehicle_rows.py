@@ -72,7 +72,17 @@ def line_of(vehicle: VehicleMonitor, now_ns: int) -> str:
         f"est {estimate_m * 1e3:5.2f} mm {math.degrees(estimate_rad):5.3f} deg  "
         f"imu {vehicle.rate_hz(m.Imu, now_ns):3.0f}/s lost {0 if imu is None else imu.frames_lost}  "
         f"fix {vehicle.rate_hz(m.StarFix, now_ns):4.1f}/s age {age_s:.2f} s used {used} refused {refused}"
+        f"{_no_fix(vehicle)}"
     )
+
+
+def _no_fix(vehicle: VehicleMonitor) -> str:
+    """Why the newest picture gave no fix, and how many gave none for that; empty if it gave one."""
+    fix = _newest(vehicle, m.StarFix)
+    if fix is None or fix.fix:
+        return ""
+    kind = fix.reason.partition(":")[0]
+    return f"  no fix: {kind} ({vehicle.refused.get(kind, 0)} x)"
 
 
 def _newest(vehicle: VehicleMonitor, kind: type[Kind]) -> Kind | None:
@@ -159,11 +169,15 @@ def _fixes(vehicle: VehicleMonitor, now_ns: int) -> Text:
 
 
 def _refused(vehicle: VehicleMonitor) -> Text:
-    """What the star tracker says most often when it has no fix."""
+    """Why there is no fix now, and how often each reason was given, the most frequent first."""
     if not vehicle.refused:
         return _NOTHING
-    reason, count = max(vehicle.refused.items(), key=lambda item: item[1])
-    return Text(f"{count} x {reason}", style=_DIM, overflow="ellipsis")
+    fix = _newest(vehicle, m.StarFix)
+    text = Text(overflow="ellipsis")
+    if fix is not None and not fix.fix:
+        text.append("now: ", style=_BAD).append(fix.reason.partition(":")[0], style=_BAD).append("; ")
+    counts = sorted(vehicle.refused.items(), key=lambda item: -item[1])
+    return text.append(", ".join(f"{count} x {reason}" for reason, count in counts), style=_DIM)
 
 
 def _tank(vehicle: VehicleMonitor) -> Text:

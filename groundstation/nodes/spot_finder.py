@@ -15,18 +15,31 @@ _NONE = np.empty(0, np.float32)
 
 
 class SpotFinder(Node):
-    """Looks for stars in every frame that it is given; a frame it cannot use is said with the reason."""
+    """Looks for stars in every frame that it is given; a frame it cannot use is said with the reason.
+
+    Args:
+        vehicle: Its name.
+        size_px: Columns and rows of the frames for which the camera is calibrated; None for any.
+        settings: What counts as a spot.
+    """
 
     inputs = (StarImage,)
     outputs = (StarSpots,)
 
-    def __init__(self, vehicle: str, settings: DetectorSettings | None = None) -> None:
+    def __init__(
+        self, vehicle: str, size_px: tuple[int, int] | None = None, settings: DetectorSettings | None = None
+    ) -> None:
         super().__init__(vehicle)
+        self._size_px = size_px
         self._settings = settings or DetectorSettings()
         cv2.setNumThreads(1)  # results must not depend on the number of cores
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         assert isinstance(message, StarImage)
+        reason = self._mismatch(message)
+        if reason:
+            yield self._unusable(message, now_ns, reason)
+            return
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
         try:
             spots = detect(image, self._settings)
@@ -50,6 +63,21 @@ class SpotFinder(Node):
             spots.is_flooded,
             "",
         )
+
+    def _mismatch(self, image: StarImage) -> str:
+        """Why a frame is not what the camera is calibrated for; empty if it is."""
+        if image.encoding != "mono8":
+            return f"unusable picture: it comes as {image.encoding}, expected grey (mono8)"
+        if len(image.data) != image.width * image.height:
+            size = f"{image.width} x {image.height} px"
+            return f"unusable picture: cut short, {len(image.data)} bytes for {size}"
+        if self._size_px not in (None, (image.width, image.height)):
+            width, height = self._size_px or (0, 0)
+            return (
+                f"unusable picture: the camera gives {image.width} x {image.height} px and is calibrated "
+                f"for {width} x {height}: set its size, or calibrate it again"
+            )
+        return ""
 
     def _unusable(self, image: StarImage, now_ns: int, reason: str) -> StarSpots:
         none = (_NONE,) * 6

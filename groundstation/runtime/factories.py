@@ -2,6 +2,7 @@
 
 import math
 
+from calibration.camera.models import CameraCalibration
 from drivers.valve_bus.guard import Guard as Gate
 from drivers.valve_bus.valve_budget import OpenTimeLimits
 from groundstation.control.allocation import Allocator
@@ -11,6 +12,7 @@ from groundstation.control.modulation import PulseConfig, PulseModulator
 from groundstation.control.mux import MuxConfig
 from groundstation.control.registry import make_controller
 from groundstation.control.state import Goal
+from groundstation.control.valve_push import ValvePush
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.registry import ESTIMATORS
@@ -18,6 +20,7 @@ from groundstation.nodes.allocation import Allocation
 from groundstation.nodes.command_mux import CommandMux
 from groundstation.nodes.controller import Controller
 from groundstation.nodes.fix_reader import FixReader
+from groundstation.nodes.force_stand_in import ForceStandIn
 from groundstation.nodes.fusion import Fusion
 from groundstation.nodes.guard import Guard
 from groundstation.nodes.imu_reader import ImuReader
@@ -90,8 +93,10 @@ def spot_finder(rig: Rig, vehicle: str) -> Node:
     """Detection of stars in frames."""
     from groundstation.nodes.spot_finder import SpotFinder  # OpenCV loads only where it is used
 
-    del rig
-    return SpotFinder(vehicle)
+    camera = rig.mock_up_of(vehicle).star_camera
+    assert camera is not None
+    lens = CameraCalibration.load(camera.camera)
+    return SpotFinder(vehicle, (lens.width, lens.height))
 
 
 def picture_keeper(rig: Rig, vehicle: str) -> Node:
@@ -118,7 +123,11 @@ def fusion(rig: Rig, vehicle: str) -> Node:
     method = rig.mock_up_of(vehicle).fusion.method
     noise, grid = noise_of(rig, vehicle), slope_grid_of(rig)
     estimator = ESTIMATORS[method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
-    return Fusion(vehicle, estimator, method, fix_floor_of(rig, vehicle), calibration_texts(rig, vehicle))
+    mock_up = rig.mock_up_of(vehicle)
+    push = ValvePush(_model(mock_up), mock_up.valves.open_delay_s, mock_up.valves.close_delay_s)
+    stand_in = ForceStandIn(estimator, push, mock_up.mass_kg, mock_up.inertia_kg_m2)
+    floor, files = fix_floor_of(rig, vehicle), calibration_texts(rig, vehicle)
+    return Fusion(vehicle, estimator, method, floor, files, stand_in)
 
 
 def controller(rig: Rig, vehicle: str) -> Node:

@@ -71,7 +71,7 @@ class VehicleMonitor:
     station_errors: Errors = field(default_factory=Errors)
     """Truth against goal."""
     refused: dict[str, int] = field(default_factory=dict)
-    """Fixes refused, by reason."""
+    """Fixes refused, by the kind of reason (what stands before the colon)."""
 
     def rate_hz(self, payload: type[Message], now_ns: int) -> float:
         """Messages per second of a topic."""
@@ -82,6 +82,14 @@ class VehicleMonitor:
 _RATED: tuple[type[Message], ...] = (m.Imu, m.StarFix, m.VehicleState, m.ValveCommand, m.ValveStatus)
 _SOON_AGAIN = "; next try in "  # what differs from one failure of a port to its next
 SILENT_S = 3.0
+_CONSEQUENCE = {
+    "died": ", no longer used",
+    "moved": ", no longer used",
+    "revived": ", used again",
+    "returned": ", used again",
+    "appeared": ", proposed for the catalogue",
+    "vanished": ", no longer proposed",
+}
 
 
 @dataclass(slots=True)
@@ -124,7 +132,8 @@ class Monitor:
         if isinstance(payload, m.ReferenceState):
             self._compare(vehicle, payload, now_ns)
         elif isinstance(payload, m.StarFix) and not payload.fix:
-            vehicle.refused[payload.reason] = vehicle.refused.get(payload.reason, 0) + 1
+            kind_of_refusal = payload.reason.partition(":")[0]
+            vehicle.refused[kind_of_refusal] = vehicle.refused.get(kind_of_refusal, 0) + 1
         elif isinstance(payload, m.SequencePhase):
             self.say(
                 f"{payload.vehicle}: {payload.phase}" + (f" ({payload.detail})" if payload.detail else "")
@@ -133,6 +142,7 @@ class Monitor:
             star = f"star {payload.star}" if payload.star else "a light that is no star"
             self.say(
                 f"{payload.vehicle}: {star} {payload.change} at ({payload.x_m:.3f}, {payload.y_m:.3f}) m"
+                f"{_CONSEQUENCE.get(payload.change, '')}"
             )
         elif isinstance(payload, m.Ack) and not payload.accepted:
             self.say(f"{payload.vehicle}: {payload.action} refused: {payload.reason}")

@@ -16,6 +16,12 @@ _COLOURS = {
     SpotKind.STREAK: _BLUE,
 }
 _LEGEND = "green: star   yellow: other light   blue: streak   red cross: star not seen"
+_BASIS = {
+    "": "   no pose, no places of stars",
+    "fix": "",
+    "guess": "   stars placed by the pose that fits best",
+    "state": "   stars placed by what the filter believed",
+}
 _STRETCH_PERCENTILE = 99.9
 
 
@@ -42,7 +48,7 @@ def draw_notes(image: NDArray[np.uint8], notes: PictureNotes, caption: str) -> N
         _write(canvas, name, (u + 10, v - 8), colour, 0.4)
     strip = np.full((2 * _STRIP_PX, canvas.shape[1], 3), 25, np.uint8)
     _write(strip, caption, (8, 18), (240, 240, 240), 0.5)
-    _write(strip, _LEGEND, (8, 18 + _STRIP_PX), (170, 170, 170), 0.45)
+    _write(strip, _LEGEND + _BASIS[notes.basis], (8, 18 + _STRIP_PX), (170, 170, 170), 0.45)
     return np.vstack((canvas, strip)).astype(np.uint8)
 
 

@@ -21,7 +21,7 @@ NO_SPOT = 255
 """In ``spot_of_star``: the star was not seen."""
 
 _STREAK_PX = 6.0
-_NEAR_PX = 6.0  # without a fix: a light so near to a star's place may be that star
+_NEAR_PX = 4.0  # without a fix: a light so near to a star's place may be that star
 _REACH_RATIO = 1.5  # heights: farther away a polynomial lens folds stars back into the picture
 
 

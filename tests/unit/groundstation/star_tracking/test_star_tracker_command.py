@@ -60,6 +60,18 @@ def test_every_frame_gets_its_row_with_the_columns_of_the_format(ceiling_folder,
         assert np.hypot(float(row["x_m"]) - pose[0], float(row["y_m"]) - pose[1]) < reach
 
 
+def test_refused_frames_are_drawn_or_all_of_them(ceiling_folder, tmp_path):
+    for options, names in (((), ["00002"]), (("--every-picture",), ["00000", "00001", "00002"])):
+        folder = tmp_path / f"drawn{len(options)}"
+        call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--pictures", folder, *options)
+        assert sorted(path.name for path in folder.iterdir()) == [f"{name}.png" for name in names]
+        assert cv2.imread(str(folder / "00002.png")).shape[1] == 2 * 640
+    with pytest.raises(UsageError, match="--pictures"):
+        call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--every-picture")
+    with pytest.raises(UsageError, match="a file is in its place"):
+        call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--pictures", tmp_path / "a.csv")
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -75,7 +87,7 @@ def test_a_bad_picture_is_named_and_nothing_is_written(ceiling_folder, tmp_path,
     folder = copy_of(ceiling_folder, tmp_path)
     make(folder / "frames" / "00001.png")
     with pytest.raises(UsageError, match=words) as refusal:
-        call("solve", folder, "--out", folder / "answers.csv")
+        call("solve", folder, "--out", folder / "answers.csv", "--pictures", folder / "d", "--every-picture")
     assert "00001.png" in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert sorted(p.name for p in folder.iterdir()) == ["camera.json", "ceiling.csv", "frames"]
