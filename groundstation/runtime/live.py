@@ -5,56 +5,30 @@ process say to each other never leaves it before they have heard it, and goes ou
 """
 
 import heapq
-import queue
 import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import zenoh
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import TOPICS, Delivery, Recorded, Scope, topic_named, topic_of
+from groundstation.bus.topics import TOPICS, Recorded, Scope, topic_named, topic_of
 from groundstation.bus.zenoh_bus import ZenohBus, key_of, split_key
 from groundstation.messages.base import Message
 from groundstation.messages.cdr import CodecError
 from groundstation.messages.definitions import Diagnostics, Journal
+from groundstation.runtime.live_inbox import FromPort, Inbox, Remote
 from groundstation.runtime.live_ports import PortThread
 from groundstation.runtime.ports import PortTranslation
 from groundstation.runtime.slot import Dispatch, NodeSlot, Sequences, owner_of
+from groundstation.runtime.turns import Turns
 
 JOURNAL_PERIOD_NS = 100_000_000
 LATCH_PERIOD_NS = 1_000_000_000
-
-
-class _Remote(NamedTuple):
-    key: str
-    payload: bytes
-    attachment: bytes
-
-
-class _FromPort(NamedTuple):
-    port: PortTranslation
-    stamp_ns: int
-    data: object
-
-
-class _Newest(NamedTuple):
-    """Something under this key waits in the box of newest items."""
-
-    key: str
-
-
-@dataclass(slots=True)
-class _Box:
-    """The newest item of a key, and the envelopes of those that it replaced."""
-
-    item: _Remote | _FromPort
-    replaced: list[bytes] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -103,20 +77,18 @@ class LiveProcess:
         self._sequences = sequences
         self._publish_images = publish_images
         self._dispatch = Dispatch(slots)
-        self._queue: queue.SimpleQueue[_Remote | _FromPort | _Newest | Exception | None] = queue.SimpleQueue()
-        self._newest: dict[str, _Box] = {}
-        self._newest_lock = threading.Lock()
+        self._turns = Turns(self._publish, self._hold)
+        self._inbox = Inbox()
         self._stopping = threading.Event()
         self._seen_latched: dict[str, tuple[int, int]] = {}
         self._latched: dict[str, tuple[Envelope, bytes]] = {}
         self._local: deque[Delivered] = deque()
         self._held: list[tuple[int, int, Delivered | NodeSlot]] = []
         self._held_count = 0
-        self._waiting: dict[str, list[Delivered]] = {}
         self.undecodable = 0
         self._hub_is_gone = False
         self._threads = [
-            PortThread(port, self._from_port, self._port_trouble, self._queue.put) for port in ports
+            PortThread(port, self._from_port, self._port_trouble, self._inbox.fail) for port in ports
         ]
         self._writers = {
             (topic_of(kind).index, vehicle): thread
@@ -127,7 +99,7 @@ class LiveProcess:
     def stop(self) -> None:
         """Ask the loop to end; safe in a signal handler and from any thread."""
         self._stopping.set()
-        self._queue.put(None)
+        self._inbox.wake()
 
     def run(self) -> None:
         """Run until ``stop``; nodes then have their last words and ports are closed, whatever happened."""
@@ -194,47 +166,22 @@ class LiveProcess:
             self._bus.subscribe(key, self._from_bus)
 
     def _from_bus(self, key: str, payload: bytes, attachment: bytes) -> None:
-        self._enqueue(key, _Remote(key, payload, attachment), topic_named(split_key(key)[1]).delivery)
+        self._inbox.put(key, Remote(key, payload, attachment), topic_named(split_key(key)[1]).delivery)
 
     def _from_port(self, port: PortTranslation, stamp_ns: int, data: object) -> None:
-        self._enqueue(port.channel, _FromPort(port, stamp_ns, data), port.delivery)
-
-    def _enqueue(self, key: str, item: _Remote | _FromPort, delivery: Delivery) -> None:
-        if delivery is Delivery.EVERY:
-            self._queue.put(item)
-            return
-        with self._newest_lock:
-            box = self._newest.get(key)
-            if box is None:
-                self._newest[key] = _Box(item)
-            else:
-                if isinstance(box.item, _Remote):
-                    box.replaced.append(box.item.attachment)
-                box.item = item
-        if box is None:
-            self._queue.put(_Newest(key))
+        self._inbox.put(port.channel, FromPort(port, stamp_ns, data), port.delivery)
 
     def _take(self, due_ns: int) -> None:
-        """Handle what is in the queue, waiting for it until ``due_ns`` at the longest."""
-        timeout_s = (due_ns - time.monotonic_ns()) * 1e-9
-        try:
-            item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
-        except queue.Empty:
+        """Handle what has come in, waiting for it until ``due_ns`` at the longest."""
+        taken = self._inbox.take((due_ns - time.monotonic_ns()) * 1e-9)
+        if taken is None:
             return
-        if isinstance(item, Exception):  # a bug in a port's thread: we cannot go on without the port
-            raise item
-        found: _Remote | _FromPort | None
-        if isinstance(item, _Newest):
-            with self._newest_lock:
-                box = self._newest.pop(item.key)
-            self._note_replaced(item.key, box.replaced)
-            found = box.item
-        else:
-            found = item
-        if isinstance(found, _Remote):
-            self._remote(found)
-        elif isinstance(found, _FromPort):
-            self._publish_from_port(found.port.to_message(found.stamp_ns, found.data))
+        match taken.item:
+            case Remote() as remote:
+                self._note_replaced(remote.key, taken.replaced)
+                self._remote(remote)
+            case FromPort(port, stamp_ns, data):
+                self._publish_from_port(port.to_message(stamp_ns, data))
         self._drain()
 
     def _note_replaced(self, key: str, attachments: list[bytes]) -> None:
@@ -246,7 +193,7 @@ class LiveProcess:
             for slot in self._dispatch.topics().get((topic.index, owner), ()):
                 slot.drop(Envelope.unpack(topic, owner, attachment), now_ns)
 
-    def _remote(self, item: _Remote) -> None:
+    def _remote(self, item: Remote) -> None:
         owner, noun = split_key(item.key)
         topic = topic_named(noun)
         if owner == self._process:
@@ -314,24 +261,7 @@ class LiveProcess:
         while local:
             delivered = local.popleft()
             for slot in self._dispatch.hearers(delivered.envelope.topic, delivered.payload):
-                now_ns = time.monotonic_ns()
-                if slot.timing.busy_ns and slot.busy_until_ns > now_ns:
-                    self._wait(slot, delivered, now_ns)
-                else:
-                    self._hand_over(slot, delivered, now_ns)
-
-    def _hand_over(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
-        said = slot.receive(delivered, now_ns)
-        if slot.timing.busy_ns:
-            slot.busy_until_ns = now_ns + slot.timing.busy_ns
-            self._hold(slot.busy_until_ns, slot)
-        self._publish(said)
-
-    def _wait(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
-        waiting = self._waiting.setdefault(slot.key, [])
-        if waiting and delivered.envelope.topic.delivery is Delivery.NEWEST:
-            slot.drop(waiting.pop().envelope, now_ns)
-        waiting.append(delivered)
+                self._turns.offer(slot, delivered, time.monotonic_ns())
 
     def _hold(self, stamp_ns: int, what: Delivered | NodeSlot) -> None:
         self._held_count += 1
@@ -343,14 +273,13 @@ class LiveProcess:
             if isinstance(what, Delivered):
                 self._send(what)
             else:
-                waiting = self._waiting.get(what.key)
-                if waiting:
-                    self._hand_over(what, waiting.pop(0), now_ns)
+                self._turns.free(what, now_ns)
             self._drain()
 
     def _port_trouble(self, channel: str, level: int, summary: str) -> None:
         """Called by port threads: a device opened, went away, or cannot be opened."""
-        self._queue.put(_FromPort(_TroublePort(channel), time.monotonic_ns(), (level, summary)))
+        port = _TroublePort(channel)
+        self._inbox.put(channel, FromPort(port, time.monotonic_ns(), (level, summary)), port.delivery)
 
     def _publish_journal(self, now_ns: int) -> None:
         """An empty journal is said too: it is the process's sign of life."""

@@ -13,11 +13,12 @@ from typing import Protocol
 from drivers.laboratory import Laboratory
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import Delivery, topic_of
+from groundstation.bus.topics import topic_of
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import Journal
 from groundstation.runtime.ports import PortTranslation
 from groundstation.runtime.slot import Dispatch, NodeSlot, Sequences, owner_of
+from groundstation.runtime.turns import Turns
 
 PROCESS = "lockstep"
 JOURNAL_PERIOD_NS = 100_000_000
@@ -75,7 +76,7 @@ class LockstepRunner:
         self._journal = journal
         self._sequences = sequences
         self._dispatch = Dispatch(slots)
-        self._waiting: dict[str, list[Delivered]] = {}
+        self._turns = Turns(self._publish, self._call_back)
         self._heap: list[tuple[int, int, int, _Event]] = []
         self._count = 0
         self._arrival_ns: int | None = None
@@ -108,7 +109,7 @@ class LockstepRunner:
             elif what is None:
                 self._publish_journal(stamp_ns)
             elif isinstance(what, _Free):
-                self._free(what.slot, stamp_ns)
+                self._turns.free(what.slot, stamp_ns)
             else:
                 self._tick(what, stamp_ns)
             if progress is not None and stamp_ns >= report_ns:
@@ -160,28 +161,10 @@ class LockstepRunner:
             self._arrival_known = False  # what is sent in may bring something out earlier
             self._laboratory.deliver(now_ns, port.channel, port.to_device(delivered.payload))
         for slot in self._dispatch.hearers(topic, delivered.payload):
-            if slot.timing.busy_ns and slot.busy_until_ns > now_ns:
-                self._wait(slot, delivered, now_ns)
-            else:
-                self._hand_over(slot, delivered, now_ns)
+            self._turns.offer(slot, delivered, now_ns)
 
-    def _hand_over(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
-        said = slot.receive(delivered, now_ns)
-        if slot.timing.busy_ns:
-            slot.busy_until_ns = now_ns + slot.timing.busy_ns
-            self._push(slot.busy_until_ns, _TICK_ROW, _Free(slot))
-        self._publish(said)
-
-    def _wait(self, slot: NodeSlot, delivered: Delivered, now_ns: int) -> None:
-        queue = self._waiting.setdefault(slot.key, [])
-        if queue and delivered.envelope.topic.delivery is Delivery.NEWEST:
-            slot.drop(queue.pop().envelope, now_ns)
-        queue.append(delivered)
-
-    def _free(self, slot: NodeSlot, now_ns: int) -> None:
-        queue = self._waiting.get(slot.key)
-        if queue:
-            self._hand_over(slot, queue.pop(0), now_ns)
+    def _call_back(self, stamp_ns: int, slot: NodeSlot) -> None:
+        self._push(stamp_ns, _TICK_ROW, _Free(slot))
 
     def _tick(self, slot: NodeSlot, now_ns: int) -> None:
         self._publish(slot.tick(now_ns))

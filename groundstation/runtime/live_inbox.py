@@ -1,0 +1,91 @@
+"""What waits for the loop of a live process: threads of devices and of the bus put it in."""
+
+import queue
+import threading
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from groundstation.bus.topics import Delivery
+from groundstation.runtime.ports import PortTranslation
+
+
+class Remote(NamedTuple):
+    """A message from the bus, not decoded yet."""
+
+    key: str
+    payload: bytes
+    attachment: bytes
+
+
+class FromPort(NamedTuple):
+    """What a device said, and when it arrived."""
+
+    port: PortTranslation
+    stamp_ns: int
+    data: object
+
+
+class _Newest(NamedTuple):
+    """Something under this key waits in the box of newest items."""
+
+    key: str
+
+
+@dataclass(slots=True)
+class Taken:
+    """One item, and the attachments of the messages from the bus that it replaced before anybody looked."""
+
+    item: Remote | FromPort
+    replaced: list[bytes] = field(default_factory=list)
+
+
+class Inbox:
+    """One queue in order of arrival; of topics with newest delivery it holds one item each. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[Remote | FromPort | _Newest | Exception | None] = queue.SimpleQueue()
+        self._newest: dict[str, Taken] = {}
+        self._lock = threading.Lock()
+
+    def put(self, key: str, item: Remote | FromPort, delivery: Delivery) -> None:
+        """Append, or replace what waits under this key if only the newest counts."""
+        if delivery is Delivery.EVERY:
+            self._queue.put(item)
+            return
+        with self._lock:
+            waiting = self._newest.get(key)
+            if waiting is None:
+                self._newest[key] = Taken(item)
+            else:
+                if isinstance(waiting.item, Remote):
+                    waiting.replaced.append(waiting.item.attachment)
+                waiting.item = item
+        if waiting is None:
+            self._queue.put(_Newest(key))
+
+    def fail(self, error: Exception) -> None:
+        """A thread met a bug: ``take`` raises it in the loop."""
+        self._queue.put(error)
+
+    def wake(self) -> None:
+        """Let ``take`` return at once."""
+        self._queue.put(None)
+
+    def take(self, timeout_s: float) -> Taken | None:
+        """The next item, waited for up to ``timeout_s``; None if there is none or at a ``wake``.
+
+        Raises:
+            Exception: What a thread handed to ``fail``.
+        """
+        try:
+            item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
+        except queue.Empty:
+            return None
+        if item is None:
+            return None
+        if isinstance(item, Exception):
+            raise item
+        if isinstance(item, _Newest):
+            with self._lock:
+                return self._newest.pop(item.key)
+        return Taken(item)
