@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from groundstation.runtime.errors import RigError
-from groundstation.runtime.node_table import NODES, process_of
+from groundstation.runtime.node_table import NODES, Weight, process_of
 from groundstation.runtime.ports import PortTranslation, ports_of
 from groundstation.runtime.rig import LABORATORY, Rig
 
@@ -23,6 +23,15 @@ def processes_of(rig: Rig) -> list[str]:
     if clash:
         raise RigError(f"'{clash.pop()}' names both a vehicle and a process: choose another vehicle name")
     return sorted(names, key=lambda name: (name != "commands", name))
+
+
+def gives_way(rig: Rig, process: str) -> bool:
+    """Whether a process may wait for others on a busy machine: it has heavy nodes (then no urgent ones)."""
+    return any(
+        row.weight is Weight.HEAVY and process_of(rig, row, vehicle) == process
+        for row in NODES
+        for vehicle in row.vehicles(rig)
+    )
 
 
 def check_addresses(rig: Rig) -> None:

@@ -23,12 +23,15 @@ from groundstation.runtime.child import REFUSAL
 from groundstation.runtime.errors import RigError, UsageError
 from groundstation.runtime.live import LiveProcess
 from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.plan import resolved_ports
+from groundstation.runtime.plan import gives_way, resolved_ports
 from groundstation.runtime.rig import parse_rig
 from groundstation.runtime.slot import Sequences
 
 SWITCH_INTERVAL_S = 0.0005
 """How long a thread that computes may keep one that reads a port waiting; CPython's 5 ms is late."""
+
+NICENESS = 5
+"""Of processes that give way: on a busy machine who flies goes first."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,8 @@ def run(orders: Orders) -> None:
     except ValueError as error:  # a number that no check of the rig file knows of, but some node does
         raise RigError(f"{orders.rig}: {error}") from error
     ports = [port for port in resolved_ports(rig, orders.addresses) if port.process == orders.process]
+    if gives_way(rig, orders.process):
+        os.nice(NICENESS)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds

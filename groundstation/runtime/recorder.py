@@ -14,14 +14,13 @@ from groundstation.messages.definitions import Journal
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
 from groundstation.runtime.errors import UsageError
-from groundstation.runtime.process import Orders, obey, stop_when_asked
+from groundstation.runtime.process import NICENESS, Orders, obey, stop_when_asked
 from groundstation.runtime.provenance import recording_info
 from groundstation.runtime.rig import parse_rig
 from groundstation.runtime.slot import Sequences
 
 TICK_S = 0.05
 ALIVE_PERIOD_NS = 1_000_000_000
-NICENESS = 5  # who flies goes first
 
 
 def run(orders: Orders) -> None:

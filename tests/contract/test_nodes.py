@@ -9,7 +9,7 @@ from groundstation.bus.topics import TOPICS, Recorded, Scope, topic_of
 from groundstation.messages.definitions import Diagnostics, Journal, Latency
 from groundstation.nodes.actions import ACTIONS
 from groundstation.runtime.node_table import NODES, Weight, build_slots, key_of, make_node, process_of
-from groundstation.runtime.plan import processes_of
+from groundstation.runtime.plan import gives_way, processes_of
 from groundstation.runtime.ports import ports_of
 from groundstation.runtime.rig import load_rig
 from groundstation.runtime.slot import Sequences
@@ -112,6 +112,9 @@ def test_no_process_holds_a_heavy_node_beside_an_urgent_one(rig):
     assert not [name for name, weights in held.items() if {Weight.HEAVY, Weight.URGENT} <= weights]
     assert processes_of(rig)[0] == "commands"
     assert set(processes_of(rig)) == set(held)
+    assert {name for name in held if gives_way(rig, name)} == {
+        n for n, w in held.items() if Weight.HEAVY in w
+    }
 
 
 @rigs
