@@ -20,7 +20,8 @@ class FaultKind:
     """A row of the table.
 
     Attributes:
-        device: Whom it befalls: `serial`, `imu`, `camera`, `sky` (rendered pictures only), `valves`.
+        device: Whom it befalls: `serial`, `imu`, `camera`, `sky` (rendered pictures only),
+            `overhead`, `valves`.
         says: What happens.
         parameters: Name to default value; a scenario may give these and no others.
     """
@@ -45,6 +46,8 @@ FAULT_KINDS: Mapping[str, FaultKind] = {
     "moved_star": FaultKind("sky", "One LED hangs elsewhere than in the list.",
                             {"star": 0.0, "dx_m": 0.01, "dy_m": 0.0}),
     "new_star": FaultKind("sky", "A light hangs where the list has none.", {"x_m": 0.0, "y_m": 0.0}),
+    "hidden_discs": FaultKind("overhead", "Hands cover discs from the camera over the table.",
+                              {"count": 3.0}),
     "stuck_open_valve": FaultKind("valves", "A valve stays open.", {"valve": 0.0}),
     "stuck_closed_valve": FaultKind("valves", "A valve does not open.", {"valve": 0.0}),
     "leaking_valve": FaultKind("valves", "A closed valve leaks.", {"valve": 0.0, "fraction": 0.1}),

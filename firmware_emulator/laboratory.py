@@ -5,14 +5,16 @@ of those moments, and vehicles move just as far as somebody looks or pushes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, TypedDict
 
 import numpy as np
 
 from drivers.laboratory import Arrival, CameraFrame, CanFrame, ChannelKind
 from firmware_emulator.config import LaboratoryConfig
+from firmware_emulator.devices.overhead_camera import OverheadCamera, TableExposure
 from firmware_emulator.devices.sky_renderer import SkyRenderer
 from firmware_emulator.devices.star_camera import Exposure, Renderer
+from firmware_emulator.devices.table_renderer import TableRenderer
 from firmware_emulator.devices.valve_bus import ValveBus
 from firmware_emulator.faults import Faults
 from firmware_emulator.mock_up import MockUp, Random, build_mock_up
@@ -21,7 +23,9 @@ from firmware_emulator.plant.contacts import Contacts
 from firmware_emulator.sky.sky_camera import Shutter
 
 VALVE_BUS = "valve_bus"
+OVERHEAD = "overhead_camera"
 _TABLE_STREAM = 0  # spawn keys of the random streams: the table, then vehicles from 1
+_OVERHEAD_PART = 1  # of the table's stream
 _PARTS = ("crystal", "valves", "node", "imu errors", "imu noise", "line", "housekeeping", "camera")
 
 
@@ -76,6 +80,8 @@ class EmulatedLaboratory:
             for index, vehicle in enumerate(self.config.vehicles)
         )
         self._renderers = self._build_renderers() if is_rendering else {}
+        self._overhead = self._build_overhead(start_ns)
+        self._table_renderer = self._build_table_renderer() if is_rendering else None
         self._bus = ValveBus([mock_up.node for mock_up in self.mock_ups], self.config.bus_bitrate)
         self._contacts = Contacts(table.bounds_m, table.edge_restitution, table.contact_restitution)
         self._contact_ns = start_ns
@@ -87,8 +93,10 @@ class EmulatedLaboratory:
         ]
 
     def channels(self) -> Mapping[str, ChannelKind]:
-        """Every channel: `<vehicle>/imu`, `/reference`, `/star_camera` or `/fixes`, and `valve_bus`."""
+        """Every channel: `valve_bus`, `overhead_camera`; per vehicle `imu` and what else it has."""
         channels = {VALVE_BUS: ChannelKind.CAN}
+        if self._overhead:
+            channels[OVERHEAD] = ChannelKind.CAMERA
         for mock_up in self.mock_ups:
             channels[f"{mock_up.name}/imu"] = ChannelKind.BYTES
             if mock_up.camera:
@@ -102,6 +110,8 @@ class EmulatedLaboratory:
     def next_arrival_ns(self) -> int | None:
         """Earliest stamp at which something may reach the host if nothing is sent in."""
         next_ns = self._bus.next_output_ns
+        if self._overhead:
+            next_ns = min(next_ns, self._overhead.next_output_ns)
         for mock_up in self.mock_ups:
             next_ns = min(next_ns, mock_up.imu.next_output_ns)
             for device in (mock_up.camera, mock_up.fixes, mock_up.truth):
@@ -120,6 +130,10 @@ class EmulatedLaboratory:
         arrivals = [Arrival(stamp, VALVE_BUS, frame) for stamp, frame in self._bus.take(stamp_ns)]
         for mock_up in self.mock_ups:
             self._collect(mock_up, stamp_ns, arrivals)
+        if self._overhead and self._table_renderer:
+            for arrival_ns, exposure in self._overhead.take(stamp_ns):
+                frame = CameraFrame(self._table_renderer.render(exposure), arrival_ns, exposure.sequence)
+                arrivals.append(Arrival(arrival_ns, OVERHEAD, frame))
         arrivals.sort(key=_stamp)  # stable: equal stamps keep the order of devices
         return arrivals
 
@@ -144,14 +158,21 @@ class EmulatedLaboratory:
                 return
         raise ValueError(f"nothing of type {type(data).__name__} can be sent into channel {channel!r}")
 
-    def take_exposures(self) -> list[tuple[str, Exposure]]:
-        """With `is_rendering` False: exposures (vehicle's name, exposure) whose pictures are to be drawn."""
-        return [
+    def take_exposures(self) -> list[tuple[str, Exposure | TableExposure]]:
+        """With `is_rendering` False: exposures whose pictures are to be drawn.
+
+        Returns:
+            The vehicle's name, or `overhead_camera`, with each.
+        """
+        taken: list[tuple[str, Exposure | TableExposure]] = [
             (mock_up.name, exposure)
             for mock_up in self.mock_ups
             if mock_up.camera
             for exposure in mock_up.camera.take_exposed()
         ]
+        if self._overhead:
+            taken += [(OVERHEAD, exposure) for exposure in self._overhead.take_exposed()]
+        return taken
 
     def close(self) -> None:
         """Nothing to release: everything is in memory."""
@@ -177,6 +198,25 @@ class EmulatedLaboratory:
                 )
         return renderers
 
+    def _build_overhead(self, start_ns: int) -> OverheadCamera | None:
+        config = self.config.overhead
+        if config is None:
+            return None
+        return OverheadCamera(
+            {mock_up.name: mock_up.vehicle for mock_up in self.mock_ups},
+            config.rate_hz,
+            config.exposure_s,
+            config.delay_s,
+            config.delay_jitter_s,
+            {m.name: Faults.of_vehicle(self.config.faults, m.name) for m in self.mock_ups},
+            np.random.default_rng(self._seeds(_TABLE_STREAM, 0, _OVERHEAD_PART)),
+            start_ns,
+        )
+
+    def _build_table_renderer(self) -> TableRenderer | None:
+        order = overhead_order(self.config, self._seed)
+        return None if order is None else TableRenderer.load(**order)
+
     def _wire(self) -> tuple[list[_Device], list[Callable[[int], None]]]:
         """All devices, and how each is run."""
         devices: list[_Device] = [_ContactWatch(self)]
@@ -189,6 +229,9 @@ class EmulatedLaboratory:
                 if device is not None:
                     devices.append(device)
                     runs.append(device.run)
+        if self._overhead:
+            devices.append(self._overhead)
+            runs.append(self._overhead.run)
         return devices, runs
 
     def _run_node(self, mock_up: MockUp) -> Callable[[int], None]:
@@ -241,6 +284,29 @@ def sky_seed(config: LaboratoryConfig, seed: int) -> list[int]:
 def camera_seed(config: LaboratoryConfig, seed: int, index: int) -> list[int]:
     """Seed of the noise of vehicle `index`'s camera, for whoever draws its pictures."""
     return [seed, config.seed, 1 + index, config.vehicles[index].seed_offset]
+
+
+class OverheadOrder(TypedDict):
+    """What `TableRenderer.load` takes; plain enough for a line of JSON."""
+
+    camera: str
+    circles: str
+    bounds_m: list[float]
+    radii_m: dict[str, float]
+    seed: list[int]
+
+
+def overhead_order(config: LaboratoryConfig, seed: int) -> OverheadOrder | None:
+    """What whoever draws the table needs; None without a camera over it."""
+    if config.overhead is None:
+        return None
+    return OverheadOrder(
+        camera=config.path(config.overhead.camera),
+        circles=config.path(config.overhead.circles),
+        bounds_m=list(config.table.bounds_m),
+        radii_m={vehicle.name: vehicle.radius_m for vehicle in config.vehicles},
+        seed=[seed, config.seed, len(config.vehicles) + 1],
+    )
 
 
 def _stamp(arrival: Arrival) -> int:

@@ -1,4 +1,4 @@
-"""One picture of the star camera as it reached the host."""
+"""One picture of a camera as it reached the host."""
 
 from dataclasses import dataclass
 
@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraFrame:
-    """A mono picture and the moment it was complete on the host.
+    """A picture, grey or in colour, and the moment it was complete on the host.
 
     Attributes:
-        image: uint8, shape (height, width); row 0 is the top row, x right, y down. Treat as read-only.
+        image: uint8, shape (height, width), or (height, width, 3) in blue-green-red; row 0 is
+            the top row, x right, y down. Treat as read-only.
         stamp_arrival_ns: Host monotonic clock when the last byte had been read, not the exposure.
         sequence: Counts the pictures of one source, dropped ones included, from 0.
     """
@@ -21,7 +22,9 @@ class CameraFrame:
     sequence: int
 
     def __post_init__(self) -> None:
-        if self.image.ndim != 2 or self.image.dtype != np.uint8:
+        is_picture = self.image.ndim == 2 or (self.image.ndim == 3 and self.image.shape[2] == 3)
+        if not is_picture or self.image.dtype != np.uint8:
             raise ValueError(
-                f"a camera frame is uint8 of shape (height, width), got {self.image.dtype} {self.image.shape}"
+                "a camera frame is uint8 of shape (height, width) or (height, width, 3), "
+                f"got {self.image.dtype} {self.image.shape}"
             )

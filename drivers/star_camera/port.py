@@ -55,13 +55,22 @@ class StarCamera:
         self._thread.start()
 
     @classmethod
-    def open(cls, address: int | str, *, silence_s: float = SILENCE_S, rate_hz: float = 15.0) -> Self:
+    def open(
+        cls,
+        address: int | str,
+        *,
+        silence_s: float = SILENCE_S,
+        rate_hz: float = 15.0,
+        is_colour: bool = False,
+    ) -> Self:
         """Open a device index or path, a URL, or a folder of PNG files (read at `rate_hz`).
+
+        With `is_colour` frames are blue-green-red and grey pictures count as garbled.
 
         Raises:
             NotFound: It cannot be opened.
         """
-        return cls(open_source(address, timeout_s=silence_s, rate_hz=rate_hz), silence_s)
+        return cls(open_source(address, timeout_s=silence_s, rate_hz=rate_hz, is_colour=is_colour), silence_s)
 
     @property
     def counters(self) -> CameraCounters:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import LinkLost, NotFound
 from drivers.star_camera.multipart import PartParser, boundary_of
-from drivers.star_camera.picture import decode_picture, to_mono
+from drivers.star_camera.picture import decode_picture, to_colour, to_mono
 
 _READ_BYTES = 1 << 16
 
@@ -56,14 +56,15 @@ class PictureSource(Protocol):
 
 
 class HttpSource:
-    """A multipart stream over HTTP: raw mono8, JPEG or PNG parts. No proxy, no redirection.
+    """A multipart stream over HTTP: raw mono8 or bgr8, JPEG or PNG parts. No proxy, no redirection.
 
     Raises:
         NotFound: Nobody serves a multipart stream there.
     """
 
-    def __init__(self, url: str, timeout_s: float) -> None:
+    def __init__(self, url: str, timeout_s: float, *, is_colour: bool = False) -> None:
         self.name = url
+        self._is_colour = is_colour
         self.garbled = 0
         self._timeout_s = timeout_s
         self._ready: deque[Picture] = deque()
@@ -123,7 +124,7 @@ class HttpSource:
     def _decode(self, headers: dict[str, str], body: bytes, stamp_ns: int) -> None:
         sequence = headers.get("x-sequence", "")
         try:
-            image = decode_picture(headers, body)
+            image = decode_picture(headers, body, is_colour=self._is_colour)
         except ValueError:
             self.garbled += 1
             return
@@ -137,7 +138,8 @@ class VideoSource:
         NotFound: It cannot be opened.
     """
 
-    def __init__(self, address: int | str, timeout_s: float) -> None:
+    def __init__(self, address: int | str, timeout_s: float, *, is_colour: bool = False) -> None:
+        self._convert = to_colour if is_colour else to_mono
         self.name = f"video {address}"
         self.garbled = 0
         self._reading = threading.Lock()
@@ -159,7 +161,7 @@ class VideoSource:
             if not is_there:
                 raise LinkLost(f"star camera {self.name} gives no more pictures")
             try:
-                return Picture(to_mono(image), stamp_ns)
+                return Picture(self._convert(image), stamp_ns)
             except ValueError:
                 self.garbled += 1
 
@@ -176,8 +178,9 @@ class FolderSource:
         NotFound: The folder is not there or holds no PNG file.
     """
 
-    def __init__(self, folder: Path, rate_hz: float) -> None:
+    def __init__(self, folder: Path, rate_hz: float, *, is_colour: bool = False) -> None:
         self.name = str(folder)
+        self._is_colour = is_colour
         self.garbled = 0
         self._closing = threading.Event()
         self._files = sorted(folder.glob("*.png"))
@@ -196,7 +199,8 @@ class FolderSource:
             if self._closing.wait(max(0.0, self._start_s + number * self._period_s - now_s)):
                 raise LinkLost(f"star camera folder {self.name} is closed")
             try:
-                image = decode_picture({"content-type": "image/png"}, self._files[number].read_bytes())
+                body = self._files[number].read_bytes()
+                image = decode_picture({"content-type": "image/png"}, body, is_colour=self._is_colour)
             except ValueError:
                 self.garbled += 1
                 continue
@@ -210,7 +214,9 @@ class FolderSource:
         self._closing.set()
 
 
-def open_source(address: int | str, *, timeout_s: float, rate_hz: float) -> PictureSource:
+def open_source(
+    address: int | str, *, timeout_s: float, rate_hz: float, is_colour: bool = False
+) -> PictureSource:
     """Open what an address of a rig file means.
 
     Args:
@@ -218,6 +224,7 @@ def open_source(address: int | str, *, timeout_s: float, rate_hz: float) -> Pict
             that OpenCV takes, or a folder of PNG files.
         timeout_s: How long opening and each picture may take.
         rate_hz: Pictures per second of a folder.
+        is_colour: Pictures in colour instead of grey.
 
     Raises:
         NotFound: It cannot be opened.
@@ -225,9 +232,9 @@ def open_source(address: int | str, *, timeout_s: float, rate_hz: float) -> Pict
     if isinstance(address, str) and address.isdecimal():
         address = int(address)
     if isinstance(address, int):
-        return VideoSource(address, timeout_s)
+        return VideoSource(address, timeout_s, is_colour=is_colour)
     if address.startswith("http://"):
-        return HttpSource(address, timeout_s)
+        return HttpSource(address, timeout_s, is_colour=is_colour)
     if Path(address).is_dir():
-        return FolderSource(Path(address), rate_hz)
-    return VideoSource(address, timeout_s)
+        return FolderSource(Path(address), rate_hz, is_colour=is_colour)
+    return VideoSource(address, timeout_s, is_colour=is_colour)

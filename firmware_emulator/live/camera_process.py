@@ -11,17 +11,22 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from firmware_emulator.devices.overhead_camera import TableExposure
 from firmware_emulator.devices.sky_renderer import SkyRenderer
-from firmware_emulator.devices.star_camera import Exposure, Renderer
+from firmware_emulator.devices.star_camera import Exposure
+from firmware_emulator.devices.table_renderer import TableRenderer
 from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
+from firmware_emulator.sky.sky import SkyFaults
 from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
@@ -37,16 +42,16 @@ class LiveCamera:
         jpeg_quality: For the MJPEG stream.
     """
 
-    def __init__(self, renderer: Renderer, jpeg_quality: int) -> None:
-        self._renderer = renderer
+    def __init__(self, renderer: SkyRenderer | TableRenderer, jpeg_quality: int) -> None:
+        self._render: Callable[[Any], NDArray[np.uint8]] = renderer.render
         self._jpeg_quality = jpeg_quality
         self._changed = threading.Condition()
-        self._orders: deque[Exposure] = deque(maxlen=_MAX_ORDERS)
+        self._orders: deque[Exposure | TableExposure] = deque(maxlen=_MAX_ORDERS)
         self._newest: tuple[int, NDArray[np.uint8]] | None = None
         self._published = 0
         threading.Thread(target=self._work, daemon=True).start()
 
-    def order(self, exposure: Exposure) -> None:
+    def order(self, exposure: Exposure | TableExposure) -> None:
         """Ask for a picture."""
         with self._changed:
             self._orders.append(exposure)
@@ -62,12 +67,13 @@ class LiveCamera:
 
     def part(self, sequence: int, image: NDArray[np.uint8], is_jpeg: bool) -> bytes:
         """One part of the multipart stream."""
-        height, width = image.shape
+        height, width = image.shape[:2]
         if is_jpeg:
             kind = "image/jpeg"
             body = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self._jpeg_quality])[1].tobytes()
         else:
-            kind, body = "application/x-mono8", image.tobytes()
+            kind = "application/x-mono8" if image.ndim == 2 else "application/x-bgr8"
+            body = image.tobytes()
         head = (
             f"--{BOUNDARY}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
             f"X-Width: {width}\r\nX-Height: {height}\r\nX-Sequence: {sequence}\r\n\r\n"
@@ -79,7 +85,7 @@ class LiveCamera:
             with self._changed:
                 self._changed.wait_for(lambda: bool(self._orders))
                 exposure = self._orders.popleft()
-            image = self._renderer.render(exposure)
+            image = self._render(exposure)
             # real time is this process's work: a frame leaves when a camera would have sent it
             time.sleep(max(0, exposure.arrival_ns - time.monotonic_ns()) / NS_PER_S)
             with self._changed:
@@ -89,7 +95,7 @@ class LiveCamera:
 
 
 def make_server(cameras: dict[str, LiveCamera], port: int = 0) -> ThreadingHTTPServer:
-    """A server on a loopback port (0: a free one): `/<vehicle>.raw` and `/<vehicle>.mjpeg`."""
+    """A server on a loopback port (0: a free one): `/<camera>.raw` and `/<camera>.mjpeg`."""
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
@@ -132,14 +138,7 @@ def main(port: int) -> int:
     cameras: dict[str, LiveCamera] = {}
     try:
         for row in json.loads(sys.stdin.readline()):
-            renderer = SkyRenderer.load(
-                row["ceiling"],
-                row["camera"],
-                Shutter(row["exposure_s"], row["readout_s"]),
-                row["sky_seed"],
-                row["camera_seed"],
-            )
-            cameras[row["name"]] = LiveCamera(renderer, row["jpeg_quality"])
+            cameras[row["name"]] = LiveCamera(_load(row), row["jpeg_quality"])
     except SceneError as error:
         print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201 - the answer to the parent
         return 2
@@ -148,8 +147,28 @@ def main(port: int) -> int:
     print(json.dumps({"port": server.server_address[1]}), flush=True)  # noqa: T201 - likewise
     for line in sys.stdin:
         name, fields = json.loads(line)
-        cameras[name].order(Exposure(**fields))
+        cameras[name].order(_exposure(fields))
     return 0
+
+
+def _load(row: dict[str, Any]) -> SkyRenderer | TableRenderer:
+    if "table" in row:
+        return TableRenderer.load(**row["table"])
+    return SkyRenderer.load(
+        row["ceiling"],
+        row["camera"],
+        Shutter(row["exposure_s"], row["readout_s"]),
+        row["sky_seed"],
+        row["camera_seed"],
+    )
+
+
+def _exposure(fields: dict[str, Any]) -> Exposure | TableExposure:
+    """What the parent's dataclass became on the way."""
+    if "paths" in fields:
+        return TableExposure(**fields)
+    faults = fields.pop("sky_faults")
+    return Exposure(**fields, sky_faults=None if faults is None else SkyFaults(**faults))
 
 
 if __name__ == "__main__":

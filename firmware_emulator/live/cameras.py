@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 
+from firmware_emulator.devices.overhead_camera import TableExposure
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
@@ -24,8 +25,8 @@ class CameraProcess:
     dropped, and a process that died is started again on the same port without waiting for it.
 
     Args:
-        rows: One table per camera: name, ceiling, camera, exposure_s, readout_s, sky_seed, camera_seed,
-            jpeg_quality.
+        rows: One table per camera: name and jpeg_quality; of a star camera ceiling, camera, exposure_s,
+            readout_s, sky_seed and camera_seed; of the camera over the table `table`, for its renderer.
 
     Raises:
         SceneError: A file of a camera cannot be read, or the process did not start.
@@ -54,10 +55,10 @@ class CameraProcess:
         self._port = int(answer["port"])
 
     def url(self, name: str, stream: str) -> str:
-        """Where the pictures of vehicle `name` are served; `stream` is raw or mjpeg."""
+        """Where the pictures of camera `name` are served; `stream` is raw or mjpeg."""
         return f"http://{LOOPBACK}:{self._port}/{name}.{stream}"
 
-    def order(self, name: str, exposure: Exposure) -> None:
+    def order(self, name: str, exposure: Exposure | TableExposure) -> None:
         """Ask for a picture."""
         if not self._say([name, asdict(exposure)]):
             self.dropped_orders += 1

@@ -11,7 +11,14 @@ from contextlib import ExitStack, suppress
 
 from drivers.laboratory import Address, CanFrame, encode_announcement
 from firmware_emulator.config import LaboratoryConfig
-from firmware_emulator.laboratory import VALVE_BUS, EmulatedLaboratory, camera_seed, sky_seed
+from firmware_emulator.laboratory import (
+    OVERHEAD,
+    VALVE_BUS,
+    EmulatedLaboratory,
+    camera_seed,
+    overhead_order,
+    sky_seed,
+)
 from firmware_emulator.live.cameras import CameraProcess
 from firmware_emulator.live.pty_port import PtyPort
 from firmware_emulator.live.slcan import SlcanSession, encode_frame
@@ -120,7 +127,7 @@ class LiveLaboratory:
         self._stack.close()
 
     def _start_cameras(self, config: LaboratoryConfig, seed: int) -> CameraProcess | None:
-        rows = [
+        rows: list[dict[str, object]] = [
             {
                 "name": vehicle.name,
                 "ceiling": config.path(vehicle.camera.ceiling),
@@ -134,6 +141,9 @@ class LiveLaboratory:
             for index, vehicle in enumerate(config.vehicles)
             if vehicle.camera.source == "rendered"
         ]
+        table = overhead_order(config, seed)
+        if config.overhead and table:
+            rows.append({"name": OVERHEAD, "table": table, "jpeg_quality": config.overhead.jpeg_quality})
         if not rows:
             return None
         cameras = CameraProcess(rows)
@@ -142,6 +152,8 @@ class LiveLaboratory:
             if vehicle.camera.source == "rendered":
                 url = cameras.url(vehicle.name, vehicle.camera.stream)
                 self.addresses[f"{vehicle.name}/star_camera"] = url
+        if config.overhead:
+            self.addresses[OVERHEAD] = cameras.url(OVERHEAD, config.overhead.stream)
         return cameras
 
     def _open(self, channel: str) -> None:

@@ -1,102 +1,53 @@
 """The overhead alternative: a camera over the table finds mock-ups by three coloured circles each.
 
-Coloured pixels are labelled per colour; every pixel is carried to the plane of the circles, where the
-centroid of its area is that of the true circle (in the picture a circle is an ellipse whose centre is
-not the circle's). Triples of blobs that fit a mock-up's pattern of distances, the right way round,
-give its pose by least squares, with covariance; several mock-ups are told apart by their patterns.
+Triples of circles that fit a mock-up's pattern, the right way round, give its pose by weighted least squares,
+with covariance; several mock-ups are told apart by their patterns, and no circle serves two. What is not
+found comes with a reason.
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.camera.liveries import Livery, check_distinct
+from calibration.camera.overhead_camera import OverheadCamera
 from calibration.camera.survey.overlap import rigid_fit
-from groundstation.star_tracking.rays import undistort
+from groundstation.star_tracking.overhead_circles import (
+    ColourSettings,
+    PlaneView,
+    SeenCircle,
+    find_circles,
+)
 
 Array = NDArray[np.float64]
 
-_PIXEL_SIGMA = 0.29  # a pixel counted as in or out of a circle: uniform rounding, 1/sqrt(12)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OverheadCamera:
-    """A camera that looks down on the table.
-
-    Attributes:
-        fx: Focal length, px.
-        fy: Focal length, px.
-        cx: Principal point, px.
-        cy: Principal point, px.
-        distortion: k1, k2, p1, p2, k3 of OpenCV's model.
-        table_from_camera: Rotation matrix (3, 3); its columns are the camera axes in the table.
-        position_table_m: Optical centre (x, y, z) in the table.
-    """
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    distortion: tuple[float, float, float, float, float]
-    table_from_camera: Array
-    position_table_m: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Circle:
-    """One circle on a mock-up: colour by name, centre in the body frame (m)."""
-
-    colour: str
-    x_body_m: float
-    y_body_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class Livery:
-    """The three circles of one mock-up."""
-
-    vehicle: str
-    circles: tuple[Circle, Circle, Circle]
-    height_table_m: float
-    radius_m: float
-
-    def __post_init__(self) -> None:
-        a, b, c = (complex(circle.x_body_m, circle.y_body_m) for circle in self.circles)
-        if abs(((b - a) * np.conj(c - a)).imag) < 1e-4:
-            raise ValueError(f"the circles of '{self.vehicle}' lie on one line")
-        if not self.radius_m > 0.0:
-            raise ValueError(f"the circles of '{self.vehicle}' need a radius")
-
-
-@dataclass(frozen=True, slots=True)
-class ColourSettings:
-    """What counts as a colour.
-
-    Attributes:
-        hue_deg: Centre of each colour's hue, 0 to 360.
-        hue_half_width_deg: Half width of each.
-        min_saturation: Of 255.
-        min_value: Of 255.
-        area_ratio: A blob's area may differ from the circle's by this factor.
-        tolerance_m: Distances within a pattern may be off by so much.
-        pixel_sigma: Error of one pixel's share in a circle; sets the covariance.
-    """
-
-    hue_deg: tuple[tuple[str, float], ...] = (("red", 0.0), ("green", 120.0), ("blue", 240.0))
-    hue_half_width_deg: float = 25.0
-    min_saturation: int = 90
-    min_value: int = 50
-    area_ratio: float = 2.0
-    tolerance_m: float = 0.01
-    pixel_sigma: float = _PIXEL_SIGMA
+SIDE_TOLERANCE_M = 0.008
+"""Sides of a pattern may be off by so much: half of what tells two patterns apart."""
+PATTERN_SIGMA_M = 0.0007
+"""How well circles are glued, per axis; the fix's floor in the rig accounts for it, this is for the gate."""
+GATE_CHI2 = 21.1
+"""Of three degrees of freedom: six numbers seen, three found; exceeded by chance once in 10,000."""
+TWIN_CHI2 = 12.0
+"""Two places that fit: the better one must be better by this much (a factor of 400 in likelihood)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OverheadFix:
-    """Pose of one mock-up: body origin and heading in the table, covariance (3, 3), misfit RMS."""
+    """Pose of one mock-up in the table at the middle of the exposure.
+
+    Attributes:
+        vehicle: Its name.
+        x_m: Body origin.
+        y_m: Body origin.
+        heading_rad: In (-pi, pi].
+        cov: Covariance (3, 3) of x, y, heading; m^2, m rad, rad^2.
+        misfit_m: RMS distance between circles and pattern.
+        circles: How many were used.
+        whole: How many of them were seen whole.
+    """
 
     vehicle: str
     x_m: float
@@ -104,151 +55,171 @@ class OverheadFix:
     heading_rad: float
     cov: Array
     misfit_m: float
+    circles: int
+    whole: int
+
+
+@dataclass(frozen=True, slots=True)
+class NoOverheadFix:
+    """Why a mock-up was not found."""
+
+    vehicle: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Blob:
-    """A coloured blob on the plane of the circles: centre, one sigma per axis, area."""
+class _Candidate:
+    """A triple of circles that fits a pattern."""
 
-    place: complex
-    std_m: float
-    area_m2: float
+    fix: OverheadFix
+    chi2: float
+    used: tuple[int, ...]
 
 
-def find_mock_ups(
-    image: NDArray[np.uint8],
-    camera: OverheadCamera,
-    liveries: Sequence[Livery],
-    settings: ColourSettings | None = None,
-) -> list[OverheadFix]:
-    """Find the mock-ups of a colour picture.
+class OverheadTracker:
+    """Finds the mock-ups in each picture on its own.
 
     Args:
-        image: Picture (h, w, 3), uint8, blue-green-red.
         camera: The overhead camera.
         liveries: The circles of the mock-ups that may be there.
-        settings: What counts as a colour.
+        settings: What counts as a coloured circle.
 
     Raises:
-        ValueError: The picture is not 8-bit colour.
+        ValueError: Two mock-ups cannot be told apart.
     """
-    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
-        raise ValueError(f"expected an 8-bit colour picture, found {image.shape} of {image.dtype}")
-    settings = settings or ColourSettings()
-    masks = _colour_masks(image, settings)
-    found: list[tuple[float, OverheadFix, list[tuple[str, complex]]]] = []
-    for livery in liveries:
-        blobs = {
-            colour: _blobs(masks[colour], camera, livery, settings)
-            for colour in {circle.colour for circle in livery.circles}
-            if colour in masks
+
+    def __init__(
+        self, camera: OverheadCamera, liveries: Sequence[Livery], settings: ColourSettings | None = None
+    ) -> None:
+        check_distinct(liveries)
+        self._camera, self._liveries = camera, tuple(liveries)
+        self._view = PlaneView(camera)
+        self._settings = settings or ColourSettings()
+
+    def look(self, image: NDArray[np.uint8]) -> list[OverheadFix | NoOverheadFix]:
+        """Find the mock-ups in a picture; one answer per livery, in their order.
+
+        Args:
+            image: Picture (h, w, 3) of the camera's size, uint8, blue-green-red.
+
+        Raises:
+            ValueError: The picture is not 8-bit colour, or of another size.
+        """
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+            raise ValueError(f"expected an 8-bit colour picture, found {image.dtype} of shape {image.shape}")
+        size = (self._camera.height, self._camera.width)
+        if image.shape[:2] != size:
+            raise ValueError(
+                f"the picture is {image.shape[1]} x {image.shape[0]} px, the camera's file says "
+                f"{size[1]} x {size[0]}"
+            )
+        sizes = {(livery.height_table_m, livery.radius_m) for livery in self._liveries}
+        circles = {
+            each: find_circles(image, self._view, *each, settings=self._settings) for each in sorted(sizes)
         }
-        found += _fits(livery, blobs, settings)
-    found.sort(key=lambda item: item[0])
-    fixes: list[OverheadFix] = []
-    taken: list[tuple[str, complex]] = []
-    for _, fix, used in found:
-        is_known = any(fix.vehicle == other.vehicle for other in fixes)
-        is_used = any(
-            colour == other and abs(place - at) < settings.tolerance_m
-            for colour, place in used
-            for other, at in taken
-        )
-        if not is_known and not is_used:
-            fixes.append(fix)
-            taken += used
-    return fixes
+        candidates: list[tuple[Livery, _Candidate]] = []
+        for livery in self._liveries:
+            seen = circles[livery.height_table_m, livery.radius_m]
+            candidates += [(livery, candidate) for candidate in candidates_of(livery, seen)]
+        taken = _assign(candidates)
+        return [
+            taken[livery.vehicle]
+            if livery.vehicle in taken
+            else NoOverheadFix(
+                livery.vehicle, _reason(livery, circles[livery.height_table_m, livery.radius_m])
+            )
+            for livery in self._liveries
+        ]
 
 
-def to_plane(camera: OverheadCamera, u_px: Array, v_px: Array, height_m: float) -> NDArray[np.complex128]:
-    """Carry pixels (n,) to the plane z = height of the table, as x + iy."""
-    x, y, _ = undistort(camera, u_px, v_px)
-    ray = np.stack((x, y, np.ones_like(x)), axis=1) @ camera.table_from_camera.T
-    origin = np.asarray(camera.position_table_m)
-    reach = (height_m - origin[2]) / ray[:, 2]
-    at = origin[:2] + reach[:, None] * ray[:, :2]
-    return np.asarray(at[:, 0] + 1j * at[:, 1], dtype=np.complex128)
-
-
-def _colour_masks(image: NDArray[np.uint8], settings: ColourSettings) -> dict[str, NDArray[np.uint8]]:
-    hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV_FULL))
-    vivid = (saturation >= settings.min_saturation) & (value >= settings.min_value)
-    half = settings.hue_half_width_deg * 256.0 / 360.0
-    masks = {}
-    for name, centre_deg in settings.hue_deg:
-        off = (hue.astype(np.int16) - round(centre_deg * 256.0 / 360.0) + 128) % 256 - 128
-        masks[name] = (vivid & (np.abs(off) <= half)).astype(np.uint8)
-    return masks
-
-
-def _blobs(
-    mask: NDArray[np.uint8], camera: OverheadCamera, livery: Livery, settings: ColourSettings
-) -> list[_Blob]:
-    """Give the blobs of one colour whose area could be a circle of the livery."""
-    count, labels = cv2.connectedComponentsWithAlgorithm(mask, 8, cv2.CV_16U, cv2.CCL_BBDT)
-    where = np.flatnonzero(mask.ravel())
-    label = np.asarray(labels).ravel()[where]
-    row = where // mask.shape[1]
-    u, v = (where - row * mask.shape[1]).astype(np.float64), row.astype(np.float64)
-    goal = np.pi * livery.radius_m**2
-    blobs = []
-    for number in range(1, count):
-        mine = label == number
-        if int(mine.sum()) < 9:
-            continue
-        place = to_plane(camera, u[mine], v[mine], livery.height_table_m)
-        right = to_plane(camera, u[mine] + 1.0, v[mine], livery.height_table_m)
-        down = to_plane(camera, u[mine], v[mine] + 1.0, livery.height_table_m)
-        share = np.abs(((right - place) * np.conj(down - place)).imag)  # area of each pixel, m^2
-        area = float(share.sum())
-        if not goal / settings.area_ratio < area < goal * settings.area_ratio:
-            continue
-        centre = complex((share @ place) / area)
-        # Only rim pixels err; there are about 2 sqrt(pi n) of them, one radius from the centre.
-        pixels = float(mine.sum())
-        rim = 2.0 * np.sqrt(np.pi * pixels)
-        pitch = np.sqrt(area / pixels)
-        std = settings.pixel_sigma * np.sqrt(rim / 2.0) * np.sqrt(pixels / np.pi) * pitch / pixels
-        blobs.append(_Blob(centre, float(std), area))
-    return blobs
-
-
-def _fits(
-    livery: Livery, blobs: dict[str, list[_Blob]], settings: ColourSettings
-) -> list[tuple[float, OverheadFix, list[tuple[str, complex]]]]:
-    """Give every triple of blobs that fits the livery: misfit, fix, and the blobs used."""
+def candidates_of(livery: Livery, seen: Sequence[SeenCircle]) -> list[_Candidate]:
+    """Give every triple of circles that fits a livery, best first."""
     body = np.array([complex(circle.x_body_m, circle.y_body_m) for circle in livery.circles])
-    choices = [blobs.get(circle.colour, []) for circle in livery.circles]
+    choices = [[i for i, one in enumerate(seen) if one.colour == circle.colour] for circle in livery.circles]
     found = []
-    for triple in product(*choices):
-        if len({id(blob) for blob in triple}) < len(triple):
+    sides = np.abs(body - np.roll(body, -1))
+    for i, j in itertools.product(choices[0], choices[1]):
+        if i == j or abs(abs(seen[i].place_m - seen[j].place_m) - sides[0]) > SIDE_TOLERANCE_M:
             continue
-        place = np.array([blob.place for blob in triple])
-        sides = np.abs(place - np.roll(place, 1)) - np.abs(body - np.roll(body, 1))
-        if float(np.abs(sides).max()) > settings.tolerance_m:
-            continue
-        turn, shift = rigid_fit(body, place)
-        residual = np.abs(turn * body + shift - place)
-        misfit = float(np.sqrt((residual**2).mean()))
-        if misfit > settings.tolerance_m:
-            continue  # the mirror image has the same sides
-        fix = OverheadFix(
-            livery.vehicle,
-            shift.real,
-            shift.imag,
-            float(np.angle(turn)),
-            _covariance(turn * body, np.array([blob.std_m for blob in triple])),
-            misfit,
-        )
-        used = [(c.colour, blob.place) for c, blob in zip(livery.circles, triple, strict=True)]
-        found.append((misfit, fix, used))
-    return found
+        for k in choices[2]:
+            if k in (i, j) or abs(abs(seen[j].place_m - seen[k].place_m) - sides[1]) > SIDE_TOLERANCE_M:
+                continue
+            if abs(abs(seen[k].place_m - seen[i].place_m) - sides[2]) > SIDE_TOLERANCE_M:
+                continue
+            candidate = _fit(livery, body, [seen[n] for n in (i, j, k)], (i, j, k))
+            if candidate.chi2 < GATE_CHI2:  # the mirror image has the same sides and a large misfit
+                found.append(candidate)
+    return sorted(found, key=lambda candidate: candidate.chi2)
 
 
-def _covariance(arm_m: NDArray[np.complex128], std_m: Array) -> Array:
-    """Covariance of (x, y, heading) from points at ``arm_m`` of the body origin, table axes."""
-    information = np.zeros((3, 3))
-    for arm, std in zip(arm_m, std_m, strict=True):
-        lever = np.array([[1.0, 0.0, -arm.imag], [0.0, 1.0, arm.real]])
-        information += lever.T @ lever / std**2
-    return np.asarray(np.linalg.inv(information))
+def _fit(
+    livery: Livery, body: NDArray[np.complex128], circles: Sequence[SeenCircle], used: tuple[int, ...]
+) -> _Candidate:
+    """Weighted least squares of x, y, heading."""
+    place = np.array([circle.place_m for circle in circles])
+    turn, shift = rigid_fit(body, place)
+    x = np.array([shift.real, shift.imag, float(np.angle(turn))])
+    own = [np.linalg.inv(circle.cov_m2) for circle in circles]
+    for _ in range(2):
+        arm = body * np.exp(1j * x[2])
+        residual = place - (complex(x[0], x[1]) + arm)
+        information, gradient = np.zeros((3, 3)), np.zeros(3)
+        for a, r, weight in zip(arm, residual, own, strict=True):
+            lever = np.array([[1.0, 0.0, -a.imag], [0.0, 1.0, a.real]])
+            information += lever.T @ weight @ lever
+            gradient += lever.T @ weight @ (r.real, r.imag)
+        cov = np.linalg.inv(information)
+        x = x + cov @ gradient
+    residual = place - (complex(x[0], x[1]) + body * np.exp(1j * x[2]))
+    glue = np.eye(2) * PATTERN_SIGMA_M**2
+    chi2 = sum(
+        float((r.real, r.imag) @ np.linalg.inv(circle.cov_m2 + glue) @ (r.real, r.imag))
+        for r, circle in zip(residual, circles, strict=True)
+    )
+    fix = OverheadFix(
+        livery.vehicle,
+        float(x[0]),
+        float(x[1]),
+        float(np.angle(np.exp(1j * x[2]))),
+        np.asarray(cov),
+        float(np.sqrt((np.abs(residual) ** 2).mean())),
+        len(circles),
+        sum(circle.is_whole for circle in circles),
+    )
+    return _Candidate(fix, chi2, used)
+
+
+def _assign(
+    candidates: Iterable[tuple[Livery, _Candidate]],
+) -> dict[str, OverheadFix | NoOverheadFix]:
+    """Give each mock-up its best triple, each circle to one mock-up; two triples as good are none."""
+    taken: dict[str, OverheadFix | NoOverheadFix] = {}
+    chi2_of: dict[str, float] = {}
+    used: set[tuple[tuple[float, float], int]] = set()
+    for livery, candidate in sorted(candidates, key=lambda each: each[1].chi2):
+        plane = (livery.height_table_m, livery.radius_m)
+        mine = {(plane, number) for number in candidate.used}
+        if livery.vehicle in taken:
+            is_twin = not mine & used and candidate.chi2 - chi2_of[livery.vehicle] < TWIN_CHI2
+            if is_twin:
+                taken[livery.vehicle] = NoOverheadFix(livery.vehicle, "its circles are seen at two places")
+            continue
+        if mine & used:
+            continue
+        taken[livery.vehicle] = candidate.fix
+        chi2_of[livery.vehicle] = candidate.chi2
+        used |= mine
+    return taken
+
+
+def _reason(livery: Livery, seen: Sequence[SeenCircle]) -> str:
+    missing = [
+        colour
+        for colour in dict.fromkeys(circle.colour for circle in livery.circles)
+        if not any(one.colour == colour for one in seen)
+    ]
+    if not seen:
+        return "no coloured circle in the picture"
+    if missing:
+        return f"no {' and no '.join(missing)} circle in the picture"
+    return "no three circles make its pattern"

@@ -13,6 +13,7 @@ from firmware_emulator.laboratory import EmulatedLaboratory
 MS = 1_000_000
 S = 1_000_000_000
 START_S = 0.5
+FILES = Path(__file__).parents[3] / "calibration" / "rigs" / "emulated"
 STRONGER = {
     "bit_flips": {"probability_per_bit": 0.01},
     "lost_bytes": {"probability_per_byte": 0.05},
@@ -39,7 +40,7 @@ def scene(tmp_path_factory):
     return folder
 
 
-def fly(scene, faults, source):
+def fly(scene, faults, source, *, has_overhead=False):
     camera = {"source": source, "rate_hz": 10.0, "delay_s": 0.05}
     if source == "rendered":
         camera |= {"ceiling": "ceiling.csv", "camera": "camera.json"}
@@ -51,6 +52,9 @@ def fly(scene, faults, source):
         "camera": camera,
     }
     config = {"folder": str(scene), "vehicles": [vehicle], "faults": faults}
+    if has_overhead:
+        files = {"camera": FILES / "overhead_camera.json", "circles": FILES / "circles.toml"}
+        config["overhead"] = {"rate_hz": 4.0, **{key: str(path) for key, path in files.items()}}
     laboratory = EmulatedLaboratory(config, seed=11)
     arrivals = []
     laboratory.deliver(0, "valve_bus", encode(Arm(0, True)))
@@ -75,7 +79,10 @@ def said(arrivals, until_ns=None):
 def test_every_fault_of_the_table_acts_and_only_from_its_start(scene, kind):
     source = "rendered" if FAULT_KINDS[kind].device in ("camera", "sky") else "fixes"
     fault = {"kind": kind, "vehicle": "alpha", "start_s": START_S, "parameters": STRONGER.get(kind, {})}
-    healthy, ill, again = (fly(scene, faults, source) for faults in ([], [fault], [fault]))
+    has_overhead = FAULT_KINDS[kind].device == "overhead"
+    healthy, ill, again = (
+        fly(scene, faults, source, has_overhead=has_overhead) for faults in ([], [fault], [fault])
+    )
     start_ns = round(START_S * S)
     assert said(ill, start_ns) == said(healthy, start_ns)
     assert said(ill) != said(healthy)

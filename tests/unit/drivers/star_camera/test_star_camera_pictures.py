@@ -145,9 +145,36 @@ def test_a_colour_picture_becomes_grey():
             to_mono(bad)
 
 
-def test_a_camera_frame_is_grey():
-    with pytest.raises(ValueError, match="height, width"):
-        CameraFrame(np.zeros((4, 4, 3), np.uint8), 0, 0)
+def test_a_camera_frame_is_grey_or_in_three_colours():
+    assert CameraFrame(np.zeros((4, 4, 3), np.uint8), 0, 0).image.shape == (4, 4, 3)
+    for bad in (np.zeros((4, 4, 2), np.uint8), np.zeros((4, 4, 3)), np.zeros(4, np.uint8)):
+        with pytest.raises(ValueError, match="height, width"):
+            CameraFrame(bad, 0, 0)
+
+
+COLOURED = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
+
+
+@pytest.mark.parametrize("kind", [".png", "raw"])
+def test_a_colour_camera_keeps_its_colours_and_a_grey_one_gets_grey(kind):
+    if kind == "raw":
+        headers = {"content-type": "application/x-bgr8", "x-width": "6", "x-height": "4"}
+        body = COLOURED.tobytes()
+    else:
+        headers, body = {"content-type": "image/png"}, cv2.imencode(kind, COLOURED)[1].tobytes()
+    assert np.array_equal(decode_picture(headers, body, is_colour=True), COLOURED)
+    assert decode_picture(headers, body).shape == (4, 6)
+    if kind == "raw":
+        with pytest.raises(ValueError, match="has 71 bytes"):
+            decode_picture(headers, body[:-1], is_colour=True)
+
+
+def test_a_grey_picture_of_a_colour_camera_is_refused():
+    raw = {"content-type": "application/x-mono8", "x-width": "4", "x-height": "4"}
+    png = {"content-type": "image/png"}
+    for headers, body in ((raw, bytes(16)), (png, cv2.imencode(".png", STARS)[1].tobytes())):
+        with pytest.raises(ValueError, match="not one of 8 bits in colour"):
+            decode_picture(headers, body, is_colour=True)
 
 
 def test_the_exposure_lies_its_delay_before_the_arrival():

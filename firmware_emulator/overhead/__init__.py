@@ -1,0 +1,1 @@
+"""What the camera over the table sees; shares nothing with whoever looks for mock-ups in its pictures."""

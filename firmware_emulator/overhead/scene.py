@@ -1,0 +1,94 @@
+"""Files of the camera over the table and of the circles on the mock-ups, as the emulator reads them."""
+
+import json
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from firmware_emulator.overhead.optics import OverheadOptics
+from firmware_emulator.sky.scene import SceneError
+
+_NUMBERS = {"dist_k1_k2_p1_p2_k3": 5, "position_table_m": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A coloured disc on top of a mock-up: colour's name and centre in the body frame."""
+
+    colour: str
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Markings:
+    """The discs of one mock-up, all of one radius at one height above the table."""
+
+    height_m: float
+    radius_m: float
+    discs: tuple[Disc, ...]
+
+
+def read_overhead_camera(path: Path) -> OverheadOptics:
+    """Optics of a camera file (JSON).
+
+    Raises:
+        SceneError: The file is missing, or a key is missing or holds something else than its number.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{path}: cannot read the camera file: {error}") from error
+
+    def numbers(key: str) -> tuple[float, ...]:
+        value = data.get(key) if isinstance(data, dict) else None
+        values = value if isinstance(value, list) else [value]
+        found = [float(item) for item in values if _is_number(item)]
+        if not len(found) == len(values) == _NUMBERS.get(key, 1):
+            raise SceneError(f"{path}: key {key!r} must hold {_NUMBERS.get(key, 1)} numbers, found {value!r}")
+        return tuple(found)
+
+    k1, k2, p1, p2, k3 = numbers("dist_k1_k2_p1_p2_k3")
+    x, y, z = numbers("position_table_m")
+    try:
+        return OverheadOptics(
+            width_px=int(numbers("width")[0]),
+            height_px=int(numbers("height")[0]),
+            focal_px=(numbers("fx")[0], numbers("fy")[0]),
+            centre_px=(numbers("cx")[0], numbers("cy")[0]),
+            distortion=(k1, k2, p1, p2, k3),
+            position_m=(x, y, z),
+            yaw_rad=numbers("yaw_rad")[0],
+            tilt_x_rad=numbers("tilt_x_rad")[0],
+            tilt_y_rad=numbers("tilt_y_rad")[0],
+        )
+    except SceneError:
+        raise
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from error
+
+
+def read_markings(path: Path) -> dict[str, Markings]:
+    """The discs of every mock-up (TOML).
+
+    Raises:
+        SceneError: The file is missing or is not of that form.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return {name: _markings(table) for name, table in data.items()}
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SceneError(f"{path}: cannot read the circles: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise SceneError(f"{path}: expected tables with height_m, radius_m and circles: {error!r}") from error
+
+
+def _markings(table: dict[str, Any]) -> Markings:
+    discs = tuple(Disc(str(row["colour"]), float(row["x_m"]), float(row["y_m"])) for row in table["circles"])
+    return Markings(float(table["height_m"]), float(table["radius_m"]), discs)
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
