@@ -18,7 +18,7 @@ import typer
 from numpy.typing import NDArray
 
 from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
-from groundstation.cli import star_calibration
+from groundstation.cli import star_amend, star_calibration
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
     check_targets,
@@ -62,6 +62,7 @@ app.command()(star_calibration.intrinsics)
 app.command()(star_calibration.board)
 app.command()(star_calibration.mount)
 app.command()(star_calibration.delay)
+app.command()(star_amend.amend)
 
 
 class Method(StrEnum):

@@ -50,6 +50,18 @@ def change_message(spots: StarSpots, found: sky_change.SkyChange) -> SkyChange:
     )
 
 
+def change_of(message: SkyChange) -> sky_change.SkyChange:
+    """What ``change_message`` was made from."""
+    return sky_change.SkyChange(
+        sky_change.Change(message.change),
+        message.star,
+        message.x_m,
+        message.y_m,
+        message.place_cov,
+        message.sightings,
+    )
+
+
 def matches_message(spots: StarSpots, notes: PictureNotes, reason: str) -> StarMatches:
     """Which light is what in one picture."""
     spot_px, star_px = notes.spot_px.astype(np.float32), notes.star_px.astype(np.float32)

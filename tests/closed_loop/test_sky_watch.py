@@ -5,10 +5,17 @@ import math
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from calibration.camera import StarCatalogue
+from groundstation.cli.errors import UsageError
+from groundstation.cli.star_tracker import app
 from groundstation.messages import definitions as m
+from groundstation.runtime.lockstep_run import run_lockstep
+from groundstation.runtime.rig import parse_rig
 
-CEILING = Path(__file__).parents[2] / "calibration" / "rigs" / "emulated" / "ceiling.csv"
+RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
+CEILING = RIG.parents[2] / "calibration" / "rigs" / "emulated" / "ceiling.csv"
 FAULT = """
 [[laboratory.faults]]
 kind = "{kind}"
@@ -66,3 +73,33 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
     assert all(fix.fix for fix in flight.of(m.StarFix))
     mode_of = {fix.mode for fix in flight.of(m.StarFix, start_s=5.0)}
     assert mode_of == {"tracking", "lost-in-space"}
+
+
+@pytest.mark.slow
+def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
+    dead, moved = stars_over_the_start()[2:4]
+    text = RIG.read_text().replace("../../calibration", str(RIG.parents[2] / "calibration"))
+    text = text.replace("late_s = 0.6", "late_s = 0.0") + "[mock_ups.standard.fusion]\nrest_s = 1.0\n"
+    text += fault("dead_star", 0.0, star=dead[0]) + fault("new_star", 0.0, x_m=NEW_M[0], y_m=NEW_M[1])
+    text += fault("moved_star", 0.0, star=moved[0], dx_m=SHIFT_M[0], dy_m=SHIFT_M[1])
+    rig_path, recording, out = tmp_path / "rig.toml", tmp_path / "run.mcap", tmp_path / "amended.csv"
+    rig_path.write_text(text)
+    run_lockstep(parse_rig(text, rig_path), rig_path, recording, 4.5, 3, lambda *_: None)
+    call = ["amend", str(CEILING), str(recording), "--out", str(out)]
+    result = CliRunner().invoke(app, call, catch_exceptions=False)
+    assert f"star {dead[1]}: struck off" in result.stdout
+    before, after = StarCatalogue.load(CEILING), StarCatalogue.load(out)
+    assert len(after.ids) == len(before.ids)  # one less, one more
+    assert dead[1] not in after.ids
+    row = after.ids.index(moved[1])
+    assert math.hypot(after.x_m[row] - moved[2] - SHIFT_M[0], after.y_m[row] - moved[3] - SHIFT_M[1]) < 3e-4
+    assert math.hypot(after.x_m[-1] - NEW_M[0], after.y_m[-1] - NEW_M[1]) < 3e-4
+    assert 0.0 < after.std_m[-1] < 3e-4
+    assert after.ids[-1] not in before.ids
+    written = out.with_suffix(".toml").read_text()
+    assert f'struck = ["{dead[1]}"]' in written
+    assert "recording_sha256" in written
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join(CEILING.read_text().splitlines()[:-1]) + "\n")
+    with pytest.raises(UsageError, match="another star list"):
+        CliRunner().invoke(app, ["amend", str(other), *call[2:]], catch_exceptions=False)
