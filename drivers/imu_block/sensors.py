@@ -80,6 +80,36 @@ class SensorFault(IntFlag):
     """The gyro's code has not changed for half a second: noise alone would have moved it."""
 
 
+class Reading(IntFlag):
+    """Which of the block's readings."""
+
+    RATE = 0x01
+    FORCE_X = 0x02
+    FORCE_Y = 0x04
+
+
+ALL_READINGS = Reading.RATE | Reading.FORCE_X | Reading.FORCE_Y
+_RATE_FAULTS = (
+    SensorFault.GYRO_STEP | SensorFault.GYRO_RANGE | SensorFault.GYRO_STUCK | SensorFault.REPORTED_GYRO
+)
+_X_FAULTS = SensorFault.TILT_X_WINDOW | SensorFault.TILT_X_SUM | SensorFault.REPORTED_TILT_X
+_Y_FAULTS = SensorFault.TILT_Y_WINDOW | SensorFault.TILT_Y_SUM | SensorFault.REPORTED_TILT_Y
+
+
+def usable_readings(faults: SensorFault) -> Reading:
+    """Return the readings that a set of faults leaves usable; a self-test leaves none."""
+    if not faults:
+        return ALL_READINGS
+    if faults & SensorFault.SELF_TEST:
+        return Reading(0)
+    usable = ALL_READINGS
+    pairs = ((_RATE_FAULTS, Reading.RATE), (_X_FAULTS, Reading.FORCE_X), (_Y_FAULTS, Reading.FORCE_Y))
+    for kinds, reading in pairs:
+        if faults & kinds:
+            usable &= ~reading
+    return usable
+
+
 _NO_STATUS = Status(0)
 _NO_FAULT = SensorFault(0)
 _LASTING = (

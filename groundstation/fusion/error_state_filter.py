@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
 from groundstation.fusion.creep_watch import CreepWatch
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
+from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.reckoner import Reckoner
@@ -65,6 +67,8 @@ class ErrorStateFilter:
         self._rests: list[tuple[float, float]] = []
         self._refused: list[tuple[float, Array]] = []
         self._creep = CreepWatch()
+        self._doubt = ForceDoubt(noise.unseen_force_m_s2_rthz)
+        self._noise_in_doubt = replace(noise, acc_density_m_s2_rthz=noise.unseen_force_m_s2_rthz)
         self._waiting: list[Fix] = []
         self._accounts: list[FixAccount] = []
 
@@ -105,6 +109,31 @@ class ErrorStateFilter:
         C: Array = H @ P @ H.T
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
         return C
+
+    def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
+        """Say which accelerometers are not believed from this stamp on."""
+        self._reckoner.start_clock(t_ns)
+        self._doubt.change(self._seconds(t_ns), x=x, y=y)
+        self.counters.add("forces_doubted" if x or y else "forces_believed_again")
+
+    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+        """Return what the accelerometers would read under a known push of the centre of mass, body axes."""
+        x = self.x
+        bias_x, bias_y = float(x[es.ACC_BIAS_X]), float(x[es.ACC_BIAS_Y])
+        state = self.state()
+        if state is not None:  # it holds the temperature's part, and the slope's in body axes
+            gx, gy = self.slope_left()
+            if self._map is not None:
+                known = self._map.at(state.x_m, state.y_m)
+                gx, gy = gx + known[0], gy + known[1]
+            c, s = math.cos(state.heading_rad), math.sin(state.heading_rad)
+            bias_x, bias_y = state.bias_ax_m_s2 + c * gx + s * gy, state.bias_ay_m_s2 + c * gy - s * gx
+        w = omega_rad_s - (x[es.GYRO_BIAS] if state is None else state.bias_omega_rad_s)
+        rx, ry = float(x[es.LEVER_X]), float(x[es.LEVER_Y])
+        return (
+            bias_x + push_m_s2[0] - turn_rad_s2 * ry - w * w * rx,
+            bias_y + push_m_s2[1] + turn_rad_s2 * rx - w * w * ry,
+        )
 
     def slope_left(self) -> tuple[float, float]:
         """Return the table's pull beyond the map, x, y (m/s^2), as of the last used fix."""
@@ -258,6 +287,7 @@ class ErrorStateFilter:
         self._reckoner.checkpoint_s = t
         self._refused.clear()
         self._rests = [r for r in self._rests if r[1] > t]
+        self._doubt.forget_before(t)
         if self._trace is None:
             self._reckoner.history.forget_before(t)
         self._integrate_to_now()
@@ -280,7 +310,9 @@ class ErrorStateFilter:
             elif len(segment.span_s):
                 flight = fly(x, segment, self._lag_difference_s, self._map)
                 rows = transition(segment, flight)
-                es.move(P, rows, moving_noise(segment, flight, self.noise))
+                noise = moving_noise(segment, flight, self.noise)
+                unseen = self._doubt.noise(a, b, float(x[es.THETA] + 0.5 * flight.turned[-1]))
+                es.move(P, rows, noise if unseen is None else noise + unseen)
                 x[: es.MOVING] = flight.moved
                 es.age(P, flight.duration_s, self.noise)
                 keep = es.forget_wave(x, P, anchor, self.noise)
@@ -307,6 +339,8 @@ class ErrorStateFilter:
             self._trace.chains[-1].steps += steps
 
     def _learn(self, x: Array, P: Array, segment: Segment) -> Corrected | None:
+        if self._doubt.touches(segment.start_s, segment.stop_s):
+            return None  # readings that were made up teach nothing
         try:
             return measurements.learn_rest(x, P, segment, self.noise, self._map)
         except measurements.RestDisturbed:
@@ -339,7 +373,8 @@ class ErrorStateFilter:
             elif len(segment.span_s):
                 x[: es.MOVING] = fly(x, segment, self._lag_difference_s, self._map).moved
         self._reckoner.load(x, x[: es.MOVING])
-        self._reckoner.variance = measurements.variance_in_time(self.x, self.P, self.noise)
+        noise = self._noise_in_doubt if self._doubt.is_open else self.noise
+        self._reckoner.variance = measurements.variance_in_time(self.x, self.P, noise)
 
     def _seconds(self, t_ns: int) -> float:
         return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from groundstation.fusion.noise import NoiseModel
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]
 
 
 class ImuPacket(NamedTuple):
@@ -117,6 +118,18 @@ class Estimator(Protocol):
 
     def covariance(self) -> Array:
         """Return (6, 6) of x, y, heading, vx, vy, omega at the newest packet, centre of mass."""
+
+    def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
+        """Say which accelerometers are not believed from this stamp on; readings are made up meanwhile."""
+
+    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+        """Return what the accelerometers would read under a known push.
+
+        Args:
+            omega_rad_s: the gyro's reading.
+            push_m_s2: acceleration of the centre of mass by the valves, body axes.
+            turn_rad_s2: angular acceleration by the valves.
+        """
 
     def slope_left(self) -> tuple[float, float]:
         """Return the table's pull (x, y, m/s^2) believed beyond a map; zeros where none is estimated."""

@@ -50,6 +50,9 @@ class NoiseModel:
     calibrated: tuple[tuple[int, float, float], ...] = ()
     """Constants that calibration files give: error state, value, sigma; in the place of what stands above."""
 
+    unseen_force_m_s2_rthz: float = 6e-3
+    """Density of the forces while an accelerometer is not believed: pulses of 20 mm/s^2 over 0.1 s."""
+
     slope_sigma_m_s2: float = 3e-3
     """Mean tilt of the table as gravity along it (9.8 mm/s^2 per mrad)."""
     waviness_sigma_m_s2: float = 2.8e-4

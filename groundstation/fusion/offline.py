@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.smoother import Smoothed, smooth
@@ -60,6 +60,14 @@ class OfflineSmoother:
     def covariance(self) -> Array:
         """Return the causal covariance (6, 6) at the newest packet."""
         return self._filter.covariance()
+
+    def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
+        """Say which accelerometers are not believed from this stamp on."""
+        self._filter.doubt_forces(t_ns, x=x, y=y)
+
+    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+        """Return what the accelerometers would read under a known push."""
+        return self._filter.expected_forces(omega_rad_s, push_m_s2, turn_rad_s2)
 
     def slope_left(self) -> tuple[float, float]:
         """Return the table's pull beyond the map, causal."""

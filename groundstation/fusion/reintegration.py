@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offset_fit import fit_offsets
 from groundstation.fusion.packet_history import PacketHistory, Segment
@@ -129,6 +129,14 @@ class ReintegrationEstimator:
             heading,
             False,
         )
+
+    def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
+        """The published method knows no uncertainty that could grow."""
+
+    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+        """Return the constant offsets and the push; turning is left out."""
+        _, mu, nu = self._offsets.tolist()
+        return mu + push_m_s2[0], nu + push_m_s2[1]
 
     def slope_left(self) -> tuple[float, float]:
         """The published method holds bias and slope in one offset and cannot name either."""

@@ -59,6 +59,11 @@ class ImuRaw(Message):
     status: U16
 
 
+USABLE_RATE, USABLE_FORCE_X, USABLE_FORCE_Y = 1, 2, 4
+USABLE_ALL = 7
+"""Bits of `Imu.usable`."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Imu(Message):
     """Calibrated averages over one window; the stamp is the END of the window.
@@ -72,6 +77,7 @@ class Imu(Message):
         force_body_m_s2: Specific force along body x, y; zero offset not removed.
         temperature_c: Temperature of the block, NaN where unknown.
         valid: False where a plausibility check failed.
+        usable: What is usable all the same: bit 0 the rate, bits 1 and 2 the forces x and y; 7 if valid.
         reason: Empty, or the failed check.
         frames_lost: Frames missing so far between MCU and here, by tick or sequence.
     """
@@ -87,3 +93,4 @@ class Imu(Message):
     valid: Bool
     reason: Text
     frames_lost: U32
+    usable: U8

@@ -19,9 +19,12 @@ from groundstation.messages.definitions import (
     Imu,
     Request,
     StarFix,
+    ValveCommand,
     ValveStatus,
     VehicleState,
 )
+from groundstation.messages.imu import USABLE_RATE
+from groundstation.nodes.force_stand_in import ForceStandIn
 from groundstation.nodes.node import Node
 
 STATUS_PERIOD_NS = 200_000_000
@@ -39,9 +42,10 @@ class Fusion(Node):
         method: Its row in the table of estimators.
         floor_std: What calibration leaves in every fix, beyond its own covariance: x, y (m), heading (rad).
         calibration: The files that the estimator was made from, by name: hash and text.
+        stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
-    inputs = (Imu, StarFix, ValveStatus, Request)
+    inputs = (Imu, StarFix, ValveStatus, ValveCommand, Request)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
@@ -51,11 +55,13 @@ class Fusion(Node):
         method: str,
         floor_std: tuple[float, float],
         calibration: Mapping[str, tuple[str, str]] = NO_FILES,
+        stand_in: ForceStandIn | None = None,
     ) -> None:
         super().__init__(vehicle, STATUS_PERIOD_NS)
         self._estimator = estimator
         self._method = method
         self._calibration = calibration
+        self._stand_in = stand_in
         self._floor = np.diag([floor_std[0] ** 2, floor_std[0] ** 2, floor_std[1] ** 2])
         self._skipped_ms = 0
         self._rest_since_ns: int | None = None
@@ -79,6 +85,8 @@ class Fusion(Node):
             case ValveStatus():
                 if message.floating or now_ns - self._float_ordered_ns >= ORDER_HOLDS_NS:
                     self._hear_float(now_ns, floating=message.floating)
+            case ValveCommand() if self._stand_in is not None:
+                self._stand_in.hear(message, now_ns)
             case Request(action="float_on"):
                 self._float_ordered_ns = now_ns
                 self._hear_float(now_ns, floating=True)
@@ -108,17 +116,21 @@ class Fusion(Node):
         if self._ticks % DIAGNOSTICS_EVERY == 0:
             counters = self._estimator.counters.by_name
             keys, values = tuple(counters), tuple(str(count) for count in counters.values())
-            yield Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/fusion", 0, "", keys, values)
+            complaint = "" if self._stand_in is None else self._stand_in.complaint
+            name = f"{self.vehicle}/fusion"
+            summary = f"{name}: {complaint}" if complaint else ""
+            yield Diagnostics(now_ns, self.vehicle, name, 1 if complaint else 0, summary, keys, values)
 
     def _propagate(self, imu: Imu) -> Iterator[Message]:
         """Integrate with the MCU's ticks; stamps only place the sample against the camera."""
-        if not imu.valid:
+        if not (imu.valid or (self._stand_in is not None and imu.usable & USABLE_RATE)):
             self._skipped_ms += imu.elapsed_ms
             return
         # samples that were refused as implausible are a hole of the same kind as lost frames
         dt_s = (imu.elapsed_ms + self._skipped_ms) * 1e-3 if imu.elapsed_ms else imu.window_s
         self._skipped_ms = 0
-        packet = ImuPacket(imu.stamp_ns, dt_s, imu.rate_body_rad_s, *imu.force_body_m_s2, imu.temperature_c)
+        force = imu.force_body_m_s2 if self._stand_in is None else self._stand_in.forces(imu, dt_s)
+        packet = ImuPacket(imu.stamp_ns, dt_s, imu.rate_body_rad_s, *force, imu.temperature_c)
         state = self._estimator.add_imu(packet)
         for account in self._estimator.settled():
             yield self._account(account, imu.stamp_ns)

@@ -6,7 +6,13 @@ from collections.abc import Iterator
 from drivers.imu_block.clock import TickClock, TickStamp
 from drivers.imu_block.commands import encode_identify, encode_set_averaging
 from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame
-from drivers.imu_block.sensors import Environment, Plausibility, rate_rad_s, specific_force_m_s2
+from drivers.imu_block.sensors import (
+    Environment,
+    Plausibility,
+    rate_rad_s,
+    specific_force_m_s2,
+    usable_readings,
+)
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import Diagnostics, Imu, ImuBytes, ImuOrder, ImuRaw
 from groundstation.nodes.node import Node
@@ -107,7 +113,8 @@ class ImuReader(Node):
     def _sample(self, frame: ImuFrame, stamp: TickStamp) -> Imu:
         faults = self._plausibility.update(frame, self._environment.status)
         self._seen_averaging = frame.sample_count
-        self._complaint = self._objection(stamp) or (faults.name.lower() if faults.name else "")
+        objection = self._objection(stamp)
+        self._complaint = objection or (faults.name.lower() if faults.name else "")
         x, y = frame.tilt_difference_counts
         return Imu(
             stamp.stamp_ns,
@@ -122,6 +129,7 @@ class ImuReader(Node):
             not self._complaint,
             self._complaint,
             self._parser.counters.frames_lost,
+            0 if objection else int(usable_readings(faults)),
         )
 
     def _objection(self, stamp: TickStamp) -> str:

@@ -19,6 +19,11 @@ from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 from groundstation.runtime.errors import RigError
 from groundstation.runtime.rig import Rig
 
+UNSEEN_SHARE = 0.15
+"""What the valves' commands leave unknown of a pair's thrust: delays, pressure, what else pulls."""
+PULSE_S = 0.1
+"""How long such an error lasts."""
+
 
 def noise_of(rig: Rig, vehicle: str) -> NoiseModel:
     """Return the error model of a vehicle: the rig's figures, and what its calibration files know better.
@@ -38,6 +43,7 @@ def rig_noise(rig: Rig, vehicle: str) -> NoiseModel:
         RigError: A calibration file of the IMU is missing or wrong.
     """
     mock_up, table = rig.mock_up_of(vehicle), rig.table
+    thrust_n = mock_up.valves.thrust_n
     imu, camera = mock_up.imu, mock_up.star_camera
     noise = NoiseModel(
         packet_period_s=imu.averaging * 1e-3,
@@ -59,6 +65,7 @@ def rig_noise(rig: Rig, vehicle: str) -> NoiseModel:
         slope_sigma_m_s2=table.slope_sigma_m_s2 or noise.slope_sigma_m_s2,
         waviness_sigma_m_s2=table.waviness_sigma_m_s2 or noise.waviness_sigma_m_s2,
         waviness_length_m=table.waviness_length_m or noise.waviness_length_m,
+        unseen_force_m_s2_rthz=UNSEEN_SHARE * 2.0 * thrust_n / mock_up.mass_kg * PULSE_S**0.5,
     )
     if not imu.calibration:
         return noise

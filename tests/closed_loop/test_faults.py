@@ -1,5 +1,7 @@
 """What goes wrong in the laboratory is counted under its name, and the vehicle survives it."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -62,11 +64,38 @@ def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
     assert distances.max() < 0.4
 
 
-def test_a_tilt_chip_that_dies_is_named_and_not_believed(fly):
-    flight = fly(fault("dead_tilt", axis=1)).run(STOP_S)
-    reasons = {imu.reason for imu in flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)}
-    assert all("tilt_y" in reason for reason in reasons)
+@pytest.mark.parametrize(("axis", "name", "usable"), [(0, "x", 0b101), (1, "y", 0b011)])
+def test_a_tilt_chip_that_dies_is_named_and_the_vehicle_flies_on_without_it(fly, axis, name, usable):
+    flight = fly(fault("dead_tilt", axis=axis)).run(STOP_S)
+    dead = flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
+    assert all(f"tilt_{name}" in imu.reason and not imu.valid and imu.usable == usable for imu in dead)
+    said = {row.summary for row in flight.said[m.Diagnostics] if row.node == "alpha/fusion"}
+    assert (
+        f"alpha/fusion: accelerometer {name} not believed: flying by gyro, fixes and valve commands" in said
+    )
+    # one state per sample, and it is right: the valves are known to have pushed
+    states = flight.of(m.VehicleState, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
+    assert len(states) == len(dead)
+    assert all(state.status == "flying" for state in states)
+    truth = flight.of(m.ReferenceState, stop_s=END_S)[-1]
+    at = min(states, key=lambda state: abs(state.stamp_ns - truth.stamp_ns))
+    assert math.dist(at.position_table_m, truth.position_table_m) < 0.015
+    assert all(
+        row.source == "controller" for row in flight.of(m.ValveSelection, start_s=FAULT_S, stop_s=END_S)
+    )
     assert_survived(flight)
+
+
+@pytest.mark.slow
+def test_without_both_tilt_chips_a_station_is_kept_for_half_a_minute(fly):
+    both = "".join(
+        fault("dead_tilt", axis=axis).replace(f"end_s = {END_S}", "end_s = 60.0") for axis in (0, 1)
+    )
+    flight = fly(both).run(36.0)
+    distances, _ = flight.off_goal(start_s=24.0)
+    assert np.sqrt(np.mean(distances**2)) < 0.015
+    truth = flight.of(m.ReferenceState)[-1]
+    assert math.dist(flight.of(m.VehicleState)[-1].position_table_m, truth.position_table_m) < 0.01
 
 
 def test_without_stars_the_age_of_the_fix_grows_and_the_vehicle_holds_on(fly):

@@ -126,10 +126,10 @@ def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end
     )
     rig = load_rig(rig_path)
     with Recorder(laps, recording_info(rig, rig_path, seed, None)) as recorder:
-        survey_laps.fly(rig, 300.0, [recorder.record], seed)
+        survey_laps.fly(rig, 240.0, [recorder.record], seed)
     result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
     assert result.exit_code == 0, result.output
-    without, gas_without, _ = tour(fly, 4, seed)
-    with_map, gas_with, _ = tour(fly, 4, seed, made)
+    without, gas_without, _ = tour(fly, 3, seed)
+    with_map, gas_with, _ = tour(fly, 3, seed, made)
     assert np.sqrt((with_map**2).mean()) < 0.5 * np.sqrt((without**2).mean())
     assert gas_with < 0.97 * gas_without

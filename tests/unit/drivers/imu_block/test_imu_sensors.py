@@ -13,13 +13,16 @@ from drivers.imu_block.protocol import (
     encode_v2,
 )
 from drivers.imu_block.sensors import (
+    ALL_READINGS,
     Environment,
     Plausibility,
+    Reading,
     SensorFault,
     rate_rad_s,
     specific_force_m_s2,
     temperature_gyro_c,
     temperature_tilt_c,
+    usable_readings,
 )
 
 
@@ -117,3 +120,16 @@ def test_a_gyro_code_that_never_moves_for_half_a_second_is_stuck_until_it_moves(
     assert faults[:500] == [SensorFault(0)] * 500
     assert faults[500] == SensorFault.GYRO_STUCK
     assert watch.update(frame(gyro=2048.25)) == SensorFault(0)
+
+
+@pytest.mark.parametrize("fault", list(SensorFault))
+def test_a_fault_costs_its_own_reading_and_a_self_test_all(fault):
+    left = usable_readings(fault)
+    if fault is SensorFault.SELF_TEST:
+        assert left == Reading(0)
+    else:
+        lost = ALL_READINGS & ~left
+        names = {Reading.RATE: "GYRO", Reading.FORCE_X: "TILT_X", Reading.FORCE_Y: "TILT_Y"}
+        assert names[lost] in fault.name
+    assert usable_readings(SensorFault(0)) == ALL_READINGS
+    assert usable_readings(SensorFault.TILT_X_SUM | SensorFault.TILT_Y_SUM) == Reading.RATE
