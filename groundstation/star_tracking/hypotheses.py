@@ -13,6 +13,7 @@ Index = NDArray[np.int64]
 # Ranks of the neighbours (0 = nearest) that form a triangle with each spot, the most useful first:
 # not the very nearest alone, whose short arm tells the heading badly.
 NEIGHBOUR_RANKS = ((0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (0, 3), (3, 5), (2, 3), (1, 4), (0, 4))
+RANK_GROUPS = (2, 6, 10)  # they are tried in groups that end here
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,8 +44,8 @@ class SpotTriangles:
 def spot_triangles(q_body_m: Complex, ranks: tuple[tuple[int, int], ...]) -> SpotTriangles:
     """Make a triangle of every spot with two of its neighbours, for each pair of ranks."""
     n = len(q_body_m)
-    distance = np.abs(q_body_m[:, None] - q_body_m[None, :])
-    neighbour = np.argsort(distance, axis=1)[:, 1:]
+    off = q_body_m[:, None] - q_body_m[None, :]
+    neighbour = np.argsort(off.real**2 + off.imag**2, axis=1, kind="stable")[:, 1:]
     usable = [(near, far) for near, far in ranks if far < n - 1]
     pivot = np.tile(np.arange(n), len(usable))
     near = np.concatenate([neighbour[:, a] for a, _ in usable]) if usable else np.zeros(0, np.int64)
@@ -57,8 +58,7 @@ def triangle_poses(index: SkyIndex, q_body_m: Complex, spots: SpotTriangles) -> 
     q_pivot, q_far, q_near = q_body_m[spots.pivot], q_body_m[spots.far], q_body_m[spots.near]
     key = triangle_key(q_far - q_pivot, q_near - q_pivot)
     query, entry = _matching(index.triangles, key, index.tolerance_m)
-    table, star = index.triangles, index.position_m
-    s_pivot, s_far, s_near = star[table.pivot[entry]], star[table.far[entry]], star[table.near[entry]]
+    s_pivot, s_far, s_near = index.position_m[index.triangles.star[entry].T]
     q_pivot, q_far, q_near = q_pivot[query], q_far[query], q_near[query]
     s_mean, q_mean = (s_pivot + s_far + s_near) / 3.0, (q_pivot + q_far + q_near) / 3.0
     product = (s_far - s_mean) * np.conj(q_far - q_mean) + (s_near - s_mean) * np.conj(q_near - q_mean)
@@ -108,5 +108,5 @@ def _matching(table: TriangleTable, key: NDArray[np.float64], tolerance_m: float
     begin = np.cumsum(size) - size
     entry = np.arange(total) + np.repeat(start - begin, size)
     query = np.repeat(np.tile(np.arange(count), 4), size)
-    close = (np.abs(table.key_m[:, entry] - key[:, query]) < tolerance_m).all(axis=0)
+    close = (np.abs(table.key_m[entry] - key.T[query]) < tolerance_m).all(axis=1)
     return query[close], entry[close]

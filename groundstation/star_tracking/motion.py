@@ -21,11 +21,11 @@ from groundstation.star_tracking.robust import middle_value
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 
-_MIN_STREAK_PX = 3.0
-_MIN_STREAKS = 4
-_MIN_STREAK_SHARE = 0.4  # of all spots: a few oblong lights are no motion
-_MAX_MISFIT_RATIO = 0.25
-_ROUNDS = 6
+MIN_STREAK_PX = 3.0
+MIN_STREAKS = 4
+MIN_STREAK_SHARE = 0.4  # of all spots: a few oblong lights are no motion
+MAX_MISFIT_RATIO = 0.25
+SMEAR_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ def smear_from_streaks(q_body_m: Complex, streak_px: Array, jacobian_m_px: Array
     Each streak is ``+-(-i a q - b)``. Signs and motion are found in turn, starting from a pure shift
     and from a pure rotation; the better end wins. Lights that do not follow are left out.
     """
-    chosen = np.hypot(streak_px[:, 0], streak_px[:, 1]) > _MIN_STREAK_PX
-    if int(chosen.sum()) < max(_MIN_STREAKS, _MIN_STREAK_SHARE * len(chosen)):
+    chosen = np.hypot(streak_px[:, 0], streak_px[:, 1]) > MIN_STREAK_PX
+    if int(chosen.sum()) < max(MIN_STREAKS, MIN_STREAK_SHARE * len(chosen)):
         return None
     q = q_body_m[chosen]
     metric = np.einsum("nij,nj->ni", jacobian_m_px[chosen], streak_px[chosen])
@@ -57,7 +57,7 @@ def smear_from_streaks(q_body_m: Complex, streak_px: Array, jacobian_m_px: Array
     starts = [np.full(len(q), streak[0]), -1j * (q - q.mean()), -1j * q]
     ends = [_alternate(q, streak, start) for start in starts]
     smear, misfit = min(ends, key=lambda end: end[1])
-    return smear if misfit < _MAX_MISFIT_RATIO * middle_value(np.abs(streak)) else None
+    return smear if misfit < MAX_MISFIT_RATIO * middle_value(np.abs(streak)) else None
 
 
 def unbend(q_body_m: Complex, smear: Smear) -> Complex:
@@ -83,7 +83,7 @@ def _alternate(q: Complex, streak: Complex, model: Complex) -> tuple[Smear, floa
     a, b = 0.0, 0j
     weight = np.ones(len(q))
     misfit = np.abs(streak)
-    for _ in range(_ROUNDS):
+    for _ in range(SMEAR_ROUNDS):
         signed = np.where((streak * np.conj(model)).real < 0.0, -streak, streak)
         total = weight.sum()
         q_mean, s_mean = (weight @ q) / total, (weight @ signed) / total

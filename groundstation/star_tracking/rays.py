@@ -40,26 +40,29 @@ class CeilingRays:
         camera: The calibration behind the table.
         scale_m_px: Length on the ceiling of one pixel near the axis.
         reach_m: Longest distance between two points of one picture.
+        table: q_x, q_y and their derivatives dx/du, dx/dv, dy/du, dy/dv; shape (rows * columns, 6).
+        columns: Entries of the table along u, one every step_px.
+        rows: Entries along v.
+        step_px: Pixels between entries.
     """
 
     def __init__(self, camera: CameraCalibration) -> None:
         self.camera = camera
         self.scale_m_px = camera.ceiling_height_above_camera_m / (0.5 * (camera.fx + camera.fy))
-        self._columns = (camera.width - 1) // _STEP_PX + 1
-        self._rows = (camera.height - 1) // _STEP_PX + 1
-        u, v = np.meshgrid(
-            np.arange(self._columns) * float(_STEP_PX), np.arange(self._rows) * float(_STEP_PX)
-        )
+        self.step_px = _STEP_PX
+        self.columns = (camera.width - 1) // _STEP_PX + 1
+        self.rows = (camera.height - 1) // _STEP_PX + 1
+        u, v = np.meshgrid(np.arange(self.columns) * float(_STEP_PX), np.arange(self.rows) * float(_STEP_PX))
         q, jacobian = ceiling_points(camera, u.ravel(), v.ravel())
-        self._table = np.concatenate((q, jacobian.reshape(-1, 4)), axis=1)
-        corners = q[[0, self._columns - 1, -self._columns, -1]]
+        self.table = np.concatenate((q, jacobian.reshape(-1, 4)), axis=1)
+        corners = q[[0, self.columns - 1, -self.columns, -1]]
         self.reach_m = float(np.max(np.linalg.norm(corners[:, None] - corners[None], axis=2)))
 
     def look_up(self, u_px: NDArray[np.float64], v_px: NDArray[np.float64]) -> CeilingPoints:
         """Give ceiling points for pixels inside the picture, shapes (n,)."""
-        column = np.clip(np.rint(u_px * (1.0 / _STEP_PX)), 0, self._columns - 1).astype(np.intp)
-        row = np.clip(np.rint(v_px * (1.0 / _STEP_PX)), 0, self._rows - 1).astype(np.intp)
-        entry = self._table[row * self._columns + column]
+        column = np.clip(np.rint(u_px * (1.0 / _STEP_PX)), 0, self.columns - 1).astype(np.intp)
+        row = np.clip(np.rint(v_px * (1.0 / _STEP_PX)), 0, self.rows - 1).astype(np.intp)
+        entry = self.table[row * self.columns + column]
         du, dv = u_px - _STEP_PX * column, v_px - _STEP_PX * row
         q = np.empty(len(du), dtype=np.complex128)
         q.real = entry[:, 0] + entry[:, 2] * du + entry[:, 3] * dv

@@ -16,9 +16,9 @@ from groundstation.star_tracking.rays import CeilingPoints
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 
-_PRIOR_FREEDOM = 6.0  # a-priori sigmas count like this many residuals when the scale is judged
-_CLIP_SIGMAS = 3.0  # of the robust scale; a few bad centres would otherwise rule the error
-_STEPS = 4
+PRIOR_FREEDOM = 6.0  # a-priori sigmas count like this many residuals when the scale is judged
+CLIP_SIGMAS = 3.0  # of the robust scale; a few bad centres would otherwise rule the error
+REFINE_STEPS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shi
     kept = np.ones(n)
     scale2 = 1.0
     e = _error(q_body_m, star_m, turn, shift_m)
-    for _ in range(_STEPS):
+    for _ in range(REFINE_STEPS):
         gradient = np.einsum("nij,ni->nj", weighted, e)
         information = _weighted_sum(kept, normal)
         step = np.linalg.solve(information, kept @ gradient)
@@ -104,13 +104,13 @@ def _clip(distance2: Array) -> tuple[Array, float]:
     # Of three unknowns n stars keep 2n - 3 degrees of freedom: small samples look better than they are.
     freedom = max(2.0 * n - 3.0, 1.0)
     robust = float(np.sort(distance2)[n // 2]) / 1.386 * (2.0 * n / freedom)
-    limit = _CLIP_SIGMAS**2 * max(robust, 0.5) * 1.3
+    limit = CLIP_SIGMAS**2 * max(robust, 0.5) * 1.3
     kept = distance2 <= limit
     if int(kept.sum()) < 3:
         kept = distance2 <= np.sort(distance2)[min(2, n - 1)]
     freedom = max(2.0 * float(kept.sum()) - 3.0, 0.0)
     total = float(distance2[kept].sum())
-    return kept.astype(np.float64), (_PRIOR_FREEDOM + total) / (_PRIOR_FREEDOM + freedom)
+    return kept.astype(np.float64), (PRIOR_FREEDOM + total) / (PRIOR_FREEDOM + freedom)
 
 
 def _inverse(matrix: Array) -> Array:

@@ -29,19 +29,15 @@ class TriangleTable:
     """Triangles of stars, sorted by key cell.
 
     Attributes:
-        pivot: Catalogue row, shape (t,).
-        far: Catalogue row, shape (t,).
-        near: Catalogue row, shape (t,).
-        key_m: Arm length, along, across; shape (3, t), m.
+        star: Catalogue rows: pivot, far, near; shape (t, 3).
+        key_m: Arm length, along, across; shape (t, 3), m.
         starts: First triangle of every cell, flat, one more entry than cells.
         cell_m: Edge of a cell.
         reach_m: Longest arm.
         cells: Cells along arm, along, across.
     """
 
-    pivot: Index
-    far: Index
-    near: Index
+    star: NDArray[np.int32]
     key_m: NDArray[np.float64]
     starts: NDArray[np.int32]
     cell_m: float
@@ -49,8 +45,25 @@ class TriangleTable:
     cells: tuple[int, int, int]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StarRaster:
+    """The nearest star of every cell of the ceiling; cells of the rim name none.
+
+    Attributes:
+        star: Catalogue row, or the number of stars for none; shape (rows, columns).
+        x0_m: Lower edge of the first column.
+        y0_m: Lower edge of the first row.
+        cell_m: Edge of a cell.
+    """
+
+    star: NDArray[np.int32]
+    x0_m: float
+    y0_m: float
+    cell_m: float
+
+
 class SkyIndex:
-    """Tables over one catalogue.
+    """Tables over one catalogue: built once, read only.
 
     Args:
         catalogue: The stars.
@@ -59,12 +72,15 @@ class SkyIndex:
     """
 
     def __init__(self, catalogue: StarCatalogue, tolerance_m: float, reach_m: float) -> None:
-        self.position_m = catalogue.x_m + 1j * catalogue.y_m
+        self.padded_m = np.append(
+            catalogue.x_m + 1j * catalogue.y_m, np.inf
+        )  # the last is the star that is none
+        self.position_m = self.padded_m[:-1]
         self.variance_m2 = catalogue.std_m**2
         self.tolerance_m = tolerance_m
         points = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
         tree = cKDTree(points)
-        self._build_raster(points)
+        self.raster = _build_raster(points)
         span = np.ptp(points, axis=0)
         self.area_m2 = float(max(span[0], 0.1) * max(span[1], 0.1))
         self.density_m2 = len(points) / self.area_m2
@@ -72,37 +88,37 @@ class SkyIndex:
         pairs = tree.query_pairs(0.7 * reach_m, output_type="ndarray")
         length = np.abs(self.position_m[pairs[:, 0]] - self.position_m[pairs[:, 1]])
         order = np.argsort(length, kind="stable")
-        self.pairs = pairs[order].astype(np.int64)
+        self.pairs = pairs[order].astype(np.int32)
         self.pair_length_m = length[order]
 
     def nearest(self, point_m: NDArray[np.complex128]) -> tuple[Index, NDArray[np.float64]]:
         """Give the nearest star and its distance for points of any shape; distance inf if none is near."""
-        column = ((point_m.real - self._x0_m) * (1.0 / _RASTER_CELL_M)).astype(np.int32)
-        row = ((point_m.imag - self._y0_m) * (1.0 / _RASTER_CELL_M)).astype(np.int32)
-        np.clip(column, 0, self._columns - 1, out=column)
-        np.clip(row, 0, self._rows - 1, out=row)
-        star = self._raster[row * self._columns + column]
-        return star, np.abs(point_m - self._padded[star])
+        raster = self.raster
+        rows, columns = raster.star.shape
+        column = ((point_m.real - raster.x0_m) * (1.0 / raster.cell_m)).astype(np.int32)
+        row = ((point_m.imag - raster.y0_m) * (1.0 / raster.cell_m)).astype(np.int32)
+        np.clip(column, 0, columns - 1, out=column)
+        np.clip(row, 0, rows - 1, out=row)
+        star = raster.star.ravel()[row * columns + column]
+        return star, np.abs(point_m - self.padded_m[star])
 
-    def _build_raster(self, points: NDArray[np.float64]) -> None:
-        cells = int(np.ceil(_RASTER_REACH_M / _RASTER_CELL_M))
-        low = points.min(axis=0) - (cells + 2) * _RASTER_CELL_M
-        shape = np.ceil((np.ptp(points, axis=0)) / _RASTER_CELL_M).astype(int) + 2 * cells + 4
-        self._x0_m, self._y0_m = float(low[0]), float(low[1])
-        self._columns, self._rows = int(shape[0]), int(shape[1])
-        step = np.arange(-cells, cells + 1)
-        du, dv = (grid.ravel() for grid in np.meshgrid(step, step))
-        home = ((points - low) / _RASTER_CELL_M).astype(np.int64)
-        column, row = home[:, :1] + du, home[:, 1:] + dv
-        centre_x = low[0] + (column + 0.5) * _RASTER_CELL_M
-        centre_y = low[1] + (row + 0.5) * _RASTER_CELL_M
-        distance = np.hypot(centre_x - points[:, :1], centre_y - points[:, 1:])
-        star = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)
-        order = np.argsort(-distance.ravel(), kind="stable")  # the nearest is written last
-        raster = np.full(self._columns * self._rows, len(points), dtype=np.int64)
-        raster[(row * self._columns + column).ravel()[order]] = star.ravel()[order]
-        self._raster = raster
-        self._padded = np.append(self.position_m, complex(np.inf, 0.0))
+
+def _build_raster(points: NDArray[np.float64]) -> StarRaster:
+    cells = int(np.ceil(_RASTER_REACH_M / _RASTER_CELL_M))
+    low = points.min(axis=0) - (cells + 2) * _RASTER_CELL_M
+    columns, rows = np.ceil(np.ptp(points, axis=0) / _RASTER_CELL_M).astype(int) + 2 * cells + 4
+    step = np.arange(-cells, cells + 1)
+    du, dv = (grid.ravel() for grid in np.meshgrid(step, step))
+    home = ((points - low) / _RASTER_CELL_M).astype(np.int64)
+    column, row = home[:, :1] + du, home[:, 1:] + dv
+    centre_x = low[0] + (column + 0.5) * _RASTER_CELL_M
+    centre_y = low[1] + (row + 0.5) * _RASTER_CELL_M
+    distance = np.hypot(centre_x - points[:, :1], centre_y - points[:, 1:])
+    star = np.broadcast_to(np.arange(len(points), dtype=np.int32)[:, None], distance.shape)
+    order = np.argsort(-distance.ravel(), kind="stable")  # the nearest is written last
+    raster = np.full(rows * columns, len(points), dtype=np.int32)
+    raster[(row * columns + column).ravel()[order]] = star.ravel()[order]
+    return StarRaster(raster.reshape(rows, columns), float(low[0]), float(low[1]), _RASTER_CELL_M)
 
 
 def _build_triangles(
@@ -121,19 +137,22 @@ def _build_triangles(
     key = triangle_key(
         complex_points[far] - complex_points[pivot], complex_points[near] - complex_points[pivot]
     )
-    cell = max(2.0 * tolerance_m, (4.0 * (arm_m + 4 * tolerance_m) ** 3 / _MAX_KEY_CELLS) ** (1.0 / 3.0))
+    # About as many cells as triangles: the table of cells stays small enough for the processor's cache.
+    fewest = min(max(len(pivot), 1), _MAX_KEY_CELLS)
+    cell = max(2.0 * tolerance_m, (4.0 * (arm_m + 4 * tolerance_m) ** 3 / fewest) ** (1.0 / 3.0))
     cells = (int(arm_m / cell) + 2, 2 * int(arm_m / cell) + 4, 2 * int(arm_m / cell) + 4)
     flat = flat_cell(key, cell, cells)
     order = np.argsort(flat, kind="stable")
     total = cells[0] * cells[1] * cells[2]
     starts = np.searchsorted(flat[order], np.arange(total + 1)).astype(np.int32)
-    return TriangleTable(pivot[order], far[order], near[order], key[:, order], starts, cell, arm_m, cells)
+    stars = np.stack((pivot, far, near), axis=1)[order].astype(np.int32)
+    return TriangleTable(stars, np.ascontiguousarray(key.T[order]), starts, cell, arm_m, cells)
 
 
 def triangle_key(far_m: NDArray[np.complex128], near_m: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Give (arm, along, across), shape (3, t), of triangles given as vectors from their pivot."""
     arm = np.abs(far_m)
-    turned = near_m * np.conj(far_m) / arm
+    turned = near_m * np.conj(far_m) / np.maximum(arm, 1e-300)
     return np.stack((arm, turned.real, turned.imag))
 
 

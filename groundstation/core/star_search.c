@@ -1,0 +1,150 @@
+/* From spots to a pose: tracking from a prior, or lost in space (search.py, where every step is told). */
+#include <string.h>
+
+#include "star_tracker.h"
+
+enum { DOUBLES_PER_SPOT = 32 }; /* carved by begin() */
+
+GS_EXPORT int64_t gs_star_doubles(int64_t spots) { return DOUBLES_PER_SPOT * spots; }
+
+GS_EXPORT int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *settings)
+{
+    return (2 + settings->neighbours) * spots + CELL * settings->candidates + stars;
+}
+
+/* Sizes of the structures, which the caller mirrors. */
+GS_EXPORT void gs_star_sizes(int64_t sizes[4])
+{
+    sizes[0] = sizeof(Rays);
+    sizes[1] = sizeof(Sky);
+    sizes[2] = sizeof(SearchSettings);
+    sizes[3] = sizeof(StarPicture);
+}
+
+static SkySearch begin(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
+{
+    const int64_t n = picture->spots;
+    SkySearch found = {.sky = sky, .rays = rays, .settings = settings, .picture = picture};
+    double *next = picture->doubles;
+    found.q = (Point *)next, next += 2 * n;
+    found.q_middle = (Point *)next, next += 2 * n;
+    found.q_matched = (Point *)next, next += 2 * n;
+    found.star_matched = (Point *)next, next += 2 * n;
+    found.jacobian = next, next += 4 * n;
+    found.weight = next, next += 3 * n;
+    found.kept = next, next += n;
+    found.distance2 = next, next += n;
+    found.free = next; /* 15 n are left: 11 n for the fit, or 9 n for streaks, or one per neighbour */
+    int32_t *integer = picture->integers;
+    found.spot_of_star = integer, integer += sky->stars; /* zero between matches */
+    found.cell = integer, integer += CELL * settings->candidates;
+    found.spot = integer, integer += n;
+    found.star = integer, integer += n;
+    found.neighbour = integer;
+    found.look_ups_left = settings->look_ups;
+    return found;
+}
+
+static int track(SkySearch *s)
+{
+    const StarPicture *p = s->picture;
+    const Point turn = unit_at(p->prior_heading_rad), shift_m = {p->prior_x_m, p->prior_y_m};
+    const double sideways = sqrt(fmax(p->prior_cov[0], p->prior_cov[4]));
+    const double turning = 0.5 * s->rays->reach_m * sqrt(p->prior_cov[8]);
+    const double sigma = sqrt(sideways * sideways + turning * turning);
+    const double gate_m = fmin(3.0 * sigma + 2.0 * s->sky->tolerance_m, 0.1);
+    return settle(s, turn, shift_m, gate_m, 1);
+}
+
+/* Whether a pose like this one was tried before; else it is noted. */
+static int is_tried(SkySearch *s, Point turn, Point shift_m)
+{
+    const int32_t cell[CELL] = {(int32_t)rint(shift_m.x / 0.05), (int32_t)rint(shift_m.y / 0.05),
+                                (int32_t)rint(atan2(turn.y, turn.x) / 0.02)};
+    for (int64_t i = 0; i < s->cells; i++) {
+        if (memcmp(s->cell + CELL * i, cell, sizeof cell) == 0) {
+            return 1;
+        }
+    }
+    memcpy(s->cell + CELL * s->cells++, cell, sizeof cell);
+    return 0;
+}
+
+static Ballot open_ballot(const SkySearch *s, int64_t spots)
+{
+    return (Ballot){.sky = s->sky, .q = s->q, .spots = spots, .room = s->look_ups_left / spots};
+}
+
+/* Settle the poses that most spots agree with. */
+static int close_ballot(SkySearch *s, const Ballot *ballot)
+{
+    s->look_ups_left -= ballot->offered * ballot->spots;
+    for (int64_t i = 0; i < ballot->count && ballot->best[i].votes >= s->settings->min_stars; i++) {
+        if (s->cells == s->settings->candidates) {
+            s->look_ups_left = 0;
+            return 0;
+        }
+        const Point turn = ballot->best[i].turn, shift_m = ballot->best[i].shift_m;
+        if (!is_tried(s, turn, shift_m) && settle(s, turn, shift_m, 2.5 * s->sky->tolerance_m, 0)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static int lost_in_space(SkySearch *s)
+{
+    const SearchSettings *settings = s->settings;
+    int64_t n = s->picture->spots < settings->identified_spots ? s->picture->spots : settings->identified_spots;
+    if (n > settings->min_stars) {
+        for (int64_t group = 0; group < settings->groups; group++) {
+            Ballot ballot = open_ballot(s, n);
+            offer_triangles(settings, group, s->free, s->neighbour, &ballot);
+            if (close_ballot(s, &ballot)) {
+                return 1;
+            }
+        }
+    }
+    if (n > settings->pair_spots_total || s->sky->pairs == 0) {
+        return 0; /* triangles fail on many spots only if they are no stars */
+    }
+    n = n < settings->pair_spots ? n : settings->pair_spots;
+    const double longest = s->sky->pair_length_m[s->sky->pairs - 1];
+    for (int64_t sum = 1; sum <= 2 * n - 3; sum++) { /* bright with bright first */
+        for (int64_t first = sum < n ? 0 : sum - n + 1; 2 * first < sum; first++) {
+            const int64_t second = sum - first;
+            if (!(length_of(sub(s->q[second], s->q[first])) < longest)) {
+                continue;
+            }
+            if (s->look_ups_left <= 0) {
+                return 0;
+            }
+            Ballot ballot = open_ballot(s, n);
+            offer_pairs(first, second, &ballot);
+            if (close_ballot(s, &ballot)) {
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Solve one picture with enough spots; the answer is in the picture. */
+GS_EXPORT void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
+{
+    SkySearch s = begin(sky, rays, settings, picture);
+    picture->is_fix = 0;
+    picture->best_nats = -INFINITY;
+    look_up_rays(rays, picture->spots, picture->u_px, picture->v_px, s.q, s.jacobian);
+    Smear smear;
+    if ((!picture->has_motion || settings->exposure_s == 0.0) &&
+        smear_from_streaks(settings, picture->spots, s.q, picture->streak_px, s.jacobian, s.free, &smear)) {
+        unbend(picture->spots, s.q, smear, s.q);
+    }
+    if (picture->has_prior) {
+        if (track(&s) || picture->spots < settings->min_stars) {
+            return;
+        }
+    }
+    lost_in_space(&s);
+}

@@ -1,0 +1,156 @@
+"""From spots to a pose: tracking from a prior, or lost in space; in NumPy.
+
+Lost in space: triangles of neighbouring spots are looked up among the catalogue's triangles; each hit
+is a pose; all poses are tested at once on the raster of nearest stars; the best are refined and must
+pass the likelihood test. Pictures with few spots go on with pairs. The work is capped, so a picture
+that shows no ceiling costs a bounded time. With a prior, the stars near where it puts the spots are
+matched directly, and lost-in-space is the fallback.
+
+``compiled_search`` does the same in the compiled core, step by step, with equal answers.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.star_tracking.detection import Spots
+from groundstation.star_tracking.fixes import BodyMotion, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.hypotheses import (
+    NEIGHBOUR_RANKS,
+    RANK_GROUPS,
+    Poses,
+    pair_poses,
+    spot_triangles,
+    triangle_poses,
+)
+from groundstation.star_tracking.motion import smear_from_streaks, unbend
+from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
+from groundstation.star_tracking.settings import TrackerSettings
+from groundstation.star_tracking.settling import Settler, Sighting
+from groundstation.star_tracking.sky_index import SkyIndex
+
+Complex = NDArray[np.complex128]
+
+_REFINED = 4  # of the poses of one look-up
+_TRIED_M, _TRIED_RAD = 0.05, 0.02  # poses nearer to each other than about this would refine to the same one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """What a search came to.
+
+    Attributes:
+        fix: The pose, if one was found and believed.
+        best_nats: Best log likelihood over chance of any pose that was refined.
+        best_guess: That pose.
+    """
+
+    fix: StarFix | None
+    best_nats: float
+    best_guess: PoseGuess | None
+
+
+class Search(Protocol):
+    """Finds the pose of enough spots; NumPy and the compiled core both do."""
+
+    def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found: ...
+
+
+class PureSearch:
+    """The search in NumPy.
+
+    Args:
+        sky: Tables over the catalogue.
+        rays: Pixel to ceiling.
+        settings: How hard to try.
+        is_dropped: Catalogue rows that no spot is matched to, and False for the star that is none,
+            shape (stars + 1,); the owner may change it between pictures.
+    """
+
+    def __init__(
+        self, sky: SkyIndex, rays: CeilingRays, settings: TrackerSettings, is_dropped: NDArray[np.bool_]
+    ) -> None:
+        self._sky, self._rays, self._settings = sky, rays, settings
+        self._settler = Settler(sky, rays, settings, is_dropped)
+
+    def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found:
+        """Search one picture.
+
+        Args:
+            spots: Brightest first; enough of them for a fix with, or without, a prior.
+            prior: What is believed of the pose.
+            motion: Velocity during the exposure.
+        """
+        points = self._rays.look_up(spots.u_px, spots.v_px)
+        if motion is None or self._settings.exposure_s == 0.0:
+            smear = smear_from_streaks(points.q_body_m, spots.streak_px, points.jacobian_m_px)
+            if smear is not None:
+                points = CeilingPoints(unbend(points.q_body_m, smear), points.jacobian_m_px)
+        sighting = Sighting(spots, points, motion, self._settings.look_ups)
+        fix = None if prior is None else self._track(sighting, prior)
+        if fix is None and len(spots) >= self._settings.min_stars:
+            fix = self._lost_in_space(sighting)
+        return Found(fix, sighting.best_nats, sighting.best_guess)
+
+    def _track(self, sighting: Sighting, prior: PosePrior) -> StarFix | None:
+        turn, shift = np.exp(1j * prior.heading_rad), complex(prior.x_table_m, prior.y_table_m)
+        sigma = math.sqrt(max(prior.cov[0, 0], prior.cov[1, 1]))
+        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.cov[2, 2]))
+        gate = min(3.0 * sigma + 2.0 * self._sky.tolerance_m, 0.1)
+        return self._settler.settle(sighting, turn, shift, gate, prior)
+
+    def _lost_in_space(self, sighting: Sighting) -> StarFix | None:
+        q = sighting.points.q_body_m[: self._settings.identified_spots]
+        if len(q) > self._settings.min_stars:
+            for begin, end in pairwise((0, *RANK_GROUPS)):
+                poses = triangle_poses(self._sky, q, spot_triangles(q, NEIGHBOUR_RANKS[begin:end]))
+                fix = self._best(sighting, q, poses)
+                if fix is not None:
+                    return fix
+        if len(q) > self._settings.pair_spots_total or len(self._sky.pairs) == 0:
+            return None  # triangles fail on many spots only if they are no stars
+        q = q[: self._settings.pair_spots]
+        first, second = np.triu_indices(len(q), k=1)
+        usable = np.abs(q[first] - q[second]) < self._sky.pair_length_m[-1]
+        order = np.argsort(first + second, kind="stable")  # bright with bright first
+        for pair in order[usable[order]]:
+            if sighting.look_ups_left <= 0:
+                break
+            poses = pair_poses(self._sky, q, int(first[pair]), int(second[pair]))
+            fix = self._best(sighting, q, poses)
+            if fix is not None:
+                return fix
+        return None
+
+    def _best(self, sighting: Sighting, q: Complex, poses: Poses) -> StarFix | None:
+        """Test all poses, settle the few that most spots agree with."""
+        room = max(sighting.look_ups_left // max(len(q), 1), 0)
+        turn, shift = poses.turn[:room], poses.shift_m[:room]
+        if len(turn) == 0:
+            return None
+        sighting.look_ups_left -= len(turn) * len(q)
+        _, distance = self._sky.nearest(turn[:, None] * q + shift[:, None])
+        votes = np.count_nonzero(distance < 2.0 * self._sky.tolerance_m, axis=1)
+        for candidate in np.argsort(-votes, kind="stable")[:_REFINED]:
+            if votes[candidate] < self._settings.min_stars:
+                break
+            if len(sighting.tested) >= self._settings.candidates:
+                sighting.look_ups_left = 0
+                break
+            cell = (
+                round(shift[candidate].real / _TRIED_M),
+                round(shift[candidate].imag / _TRIED_M),
+                round(float(np.angle(turn[candidate])) / _TRIED_RAD),
+            )
+            if cell in sighting.tested:
+                continue
+            sighting.tested.add(cell)
+            gate = 2.5 * self._sky.tolerance_m
+            fix = self._settler.settle(sighting, turn[candidate], shift[candidate], gate, None)
+            if fix is not None:
+                return fix
+        return None

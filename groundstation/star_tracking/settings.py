@@ -1,0 +1,42 @@
+"""How hard the star tracker tries and what it believes."""
+
+from dataclasses import dataclass
+
+from groundstation.star_tracking.evidence import SIGMAS_PX
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerSettings:
+    """How hard to try and what to believe.
+
+    Attributes:
+        tolerance_px: How far a triangle's lengths may be off, as pixels near the axis.
+        centre_floor_px: Error of a centre that no fit knows of (PSF, survey), one sigma per axis.
+        streak_floor_ratio: The same for streaks, per length: their true shape is not quite the fitted one.
+        evidence_nats: Log likelihood over chance that a fix must have: e^-t bounds the false ones.
+        evidence_sigmas_px: Errors of spots that the likelihood is averaged over.
+        min_stars: Stars of a fix without a prior.
+        min_stars_prior: Stars of a fix with a prior.
+        identified_spots: The brightest so many spots take part in the search.
+        pair_spots: The brightest so many take part in the search by pairs.
+        pair_spots_total: With more spots than this pairs are not tried.
+        look_ups: Cap on tested spot positions per picture.
+        candidates: Cap on poses refined per picture.
+        exposure_s: Of the camera; with a known motion it straightens streaks. 0: streaks tell themselves.
+        readout_s: Time from the first to the last row of a rolling shutter; 0 for a global one.
+    """
+
+    tolerance_px: float = 1.4
+    centre_floor_px: float = 0.012
+    streak_floor_ratio: float = 0.002
+    evidence_nats: float = 10.5
+    evidence_sigmas_px: tuple[float, ...] = SIGMAS_PX
+    min_stars: int = 4
+    min_stars_prior: int = 3
+    identified_spots: int = 60
+    pair_spots: int = 12
+    pair_spots_total: int = 20
+    look_ups: int = 80_000
+    candidates: int = 100
+    exposure_s: float = 0.0
+    readout_s: float = 0.0
