@@ -24,4 +24,11 @@
 #define GS_CLONES
 #endif
 
+/* For what a GS_CLONES function calls in its loops: only inside it does it become AVX2 too. */
+#if defined(__GNUC__)
+#define GS_INLINE static inline __attribute__((always_inline))
+#else
+#define GS_INLINE static inline
+#endif
+
 #endif

@@ -56,11 +56,14 @@ static size_t lay_out(uint8_t *base, int32_t rows, int32_t columns, const Detect
     l->means = cut(base, &used, padded * sizeof *l->means);
     l->background = cut(base, &used, cells * sizeof *l->background);
     l->threshold = cut(base, &used, cells * sizeof *l->threshold);
-    l->row = cut(base, &used, (size_t)l->width * sizeof *l->row);
-    l->blend = cut(base, &used, (size_t)l->cells_across * sizeof *l->blend);
+    l->brightest = cut(base, &used, cells * sizeof *l->brightest);
+    l->blend = cut(base, &used, ((size_t)l->cells_across + 1) * sizeof *l->blend);
     l->sums = cut(base, &used, ((size_t)columns + 4) * sizeof *l->sums);
+    l->tops = cut(base, &used, (size_t)l->width * sizeof *l->tops);
+    l->samples = cut(base, &used, (size_t)count_samples(rows, columns) * sizeof *l->samples);
     l->histogram = cut(base, &used, (MAX_LEVEL + 1) * sizeof *l->histogram);
     r->max_lit = settings->max_lit;
+    r->bright_cell = cut(base, &used, (size_t)l->cells_across * sizeof *r->bright_cell);
     r->run = cut(base, &used, lit * sizeof *r->run);
     r->row_run = cut(base, &used, ((size_t)rows + 1) * sizeof *r->row_run);
     r->group = cut(base, &used, lit * sizeof *r->group);

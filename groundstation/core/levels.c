@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { REACH = 2, LANES = 16 }; /* of the median: cells to each side; cells at once */
+enum { REACH = 2, LANES = 32 }; /* of the median: cells to each side; cells at once */
 enum { THIN_ROWS = 7, THIN_COLUMNS = 11, THIN_FIRST = 2 };
 
 static const double MIN_VARIANCE_DN2 = 1.0 / 12.0; /* an 8-bit picture is never better than its rounding */
@@ -19,11 +19,23 @@ int32_t padded_cells_across(int32_t cells_across) { return cells_across + 2 * RE
 
 int32_t padded_cells_down(int32_t cells_down) { return cells_down + 2 * REACH; }
 
+int32_t count_samples(int32_t rows, int32_t columns) { return (rows / THIN_ROWS + 1) * (columns / THIN_COLUMNS + 1); }
+
 /* Mirror an index at the border, the border pixel not doubled: -1 is 1. */
 static int32_t mirrored(int32_t i, int32_t n)
 {
     if (i < 0) return -i;
     return i < n ? i : 2 * n - 2 - i;
+}
+
+static void top_of_cells(const uint16_t *tops, int32_t cells, uint16_t *brightest)
+{
+    for (int32_t i = 0; i < cells; i++) {
+        uint16_t top = 0;
+        for (const uint16_t *column = tops + i * CELL_PX; column < tops + (i + 1) * CELL_PX; column++)
+            top = *column > top ? *column : top;
+        brightest[i] = top;
+    }
 }
 
 /* Smooth by weights 1 2 3 2 1 along columns and rows: two 3x3 box sums. */
@@ -43,10 +55,16 @@ static void smooth_picture(const Picture *p, Levels *l)
         t[-2] = t[2];
         t[n] = t[n - 2];
         t[n + 1] = t[n - 3];
-        uint16_t *restrict out = l->smooth + (ptrdiff_t)y * l->width;
-        for (int32_t x = 0; x < n; x++)
-            out[x] = (uint16_t)(t[x - 2] + t[x + 2] + 2 * (t[x - 1] + t[x + 1]) + 3 * t[x]);
+        uint16_t *restrict out = l->smooth + (ptrdiff_t)y * l->width, *restrict tops = l->tops;
+        if (y % CELL_PX == 0) memset(tops, 0, (size_t)l->width * sizeof *tops);
+        for (int32_t x = 0; x < n; x++) {
+            const uint16_t sum = (uint16_t)(t[x - 2] + t[x + 2] + 2 * (t[x - 1] + t[x + 1]) + 3 * t[x]);
+            out[x] = sum;
+            tops[x] = tops[x] > sum ? tops[x] : sum;
+        }
         for (int32_t x = n; x < l->width; x++) out[x] = 0;
+        if (y % CELL_PX == CELL_PX - 1 || y == p->rows - 1)
+            top_of_cells(tops, l->cells_across, l->brightest + y / CELL_PX * l->cells_across);
     }
 }
 
@@ -83,7 +101,7 @@ static void mean_cells(const Picture *p, Levels *l)
 }
 
 /* Put the lesser values into a, the greater into b. */
-static inline void exchange(int16_t *restrict a, int16_t *restrict b)
+GS_INLINE void exchange(int16_t *restrict a, int16_t *restrict b)
 {
     for (int k = 0; k < LANES; k++) {
         const int16_t low = a[k] < b[k] ? a[k] : b[k], high = a[k] < b[k] ? b[k] : a[k];
@@ -94,7 +112,7 @@ static inline void exchange(int16_t *restrict a, int16_t *restrict b)
 
 /* Median of 25 for LANES cells at once, into value[1]: of 14 values neither the least nor the greatest is the
  * median of all 25, so both are forgotten and one more is looked at, and so on. */
-static inline void median_of_25(int16_t value[25][LANES])
+GS_INLINE void median_of_25(int16_t value[25][LANES])
 {
     for (int size = 14, next = 14;; size--, next++) {
         for (int i = 0; i < size / 2; i++) exchange(value[i], value[size - 1 - i]);
@@ -121,55 +139,15 @@ static void median_cells(Levels *l)
         }
 }
 
-/* Where a pixel lies between centres of cells: the cell before it and how many 32ths beyond. */
-static void between_cells(int32_t pixel, int32_t cells, int32_t *cell, int32_t *part)
+void blend_row(Levels *l, const uint16_t *coarse, int32_t y)
 {
-    const int32_t from_first = 2 * pixel - (CELL_PX - 1);
-    *cell = from_first < 0 ? 0 : from_first >> 5;
-    *part = from_first & 31;
-    if (from_first < 0 || *cell >= cells - 1) {
-        *cell = from_first < 0 ? 0 : cells - 1;
-        *part = 0;
-    }
-}
-
-/* 1024 times a level to a level, halves to even. */
-static inline uint16_t rounded(int32_t level1024)
-{
-    return (uint16_t)((level1024 + 511 + ((level1024 >> 10) & 1)) >> 10);
-}
-
-GS_CLONES
-void level_row(Levels *l, const uint16_t *coarse, int32_t y)
-{
-    const int32_t n = l->cells_across;
     int32_t cell, part;
     between_cells(y, l->cells_down, &cell, &part);
-    const uint16_t *above = coarse + cell * n;
-    const uint16_t *below = coarse + min32(cell + 1, l->cells_down - 1) * n;
+    const uint16_t *restrict above = coarse + cell * l->cells_across;
+    const uint16_t *restrict below = coarse + min32(cell + 1, l->cells_down - 1) * l->cells_across;
     int32_t *restrict blend = l->blend;
-    for (int32_t i = 0; i < n; i++) blend[i] = above[i] * (32 - part) + below[i] * part;
-    uint16_t *restrict row = l->row;
-    const uint16_t first = rounded(32 * blend[0]), last = rounded(32 * blend[n - 1]);
-    for (int32_t x = 0; x < CELL_PX / 2; x++) row[x] = first;
-    for (int32_t i = 0; i < n - 1; i++) {
-        const int32_t left = 32 * blend[i], slope = blend[i + 1] - blend[i];
-        uint16_t *restrict out = row + CELL_PX / 2 + i * CELL_PX;
-        for (int32_t k = 0; k < CELL_PX; k++) out[k] = rounded(left + slope * (2 * k + 1));
-    }
-    for (int32_t x = l->width - CELL_PX / 2; x < l->width; x++) row[x] = last;
-}
-
-uint16_t level_at(const Levels *l, const uint16_t *coarse, int32_t x, int32_t y)
-{
-    int32_t i, right, j, down;
-    between_cells(x, l->cells_across, &i, &right);
-    between_cells(y, l->cells_down, &j, &down);
-    const uint16_t *above = coarse + j * l->cells_across + i;
-    const uint16_t *below = coarse + min32(j + 1, l->cells_down - 1) * l->cells_across + i;
-    const int32_t next = i + 1 < l->cells_across ? 1 : 0;
-    return rounded((above[0] * (32 - down) + below[0] * down) * (32 - right) +
-                   (above[next] * (32 - down) + below[next] * down) * right);
+    for (int32_t i = 0; i < l->cells_across; i++) blend[i] = above[i] * (32 - part) + below[i] * part;
+    blend[l->cells_across] = 0; /* read with weight zero */
 }
 
 /* The value that `rank` of the counted ones lie below. */
@@ -187,28 +165,26 @@ static int32_t ranked(const uint32_t *histogram, uint32_t rank)
 static void fit_noise_line(const Picture *p, Levels *l)
 {
     uint32_t samples = 0;
-    double limit = 0.0, count = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
     memset(l->histogram, 0, (MAX_LEVEL + 1) * sizeof *l->histogram);
-    for (int pass = 0; pass < 2; pass++) { /* first how large deviations are, then the line without the largest */
-        for (int32_t y = THIN_FIRST; y < p->rows; y += THIN_ROWS) {
-            level_row(l, l->background, y);
-            const uint16_t *line = l->smooth + (ptrdiff_t)y * l->width;
-            for (int32_t x = THIN_FIRST; x < p->columns; x += THIN_COLUMNS) {
-                const int32_t deviation = line[x] - l->row[x], size = deviation < 0 ? -deviation : deviation;
-                if (pass == 0) {
-                    l->histogram[size]++;
-                    samples++;
-                } else if (size <= limit) {
-                    const double level = l->row[x], square = (double)size * size;
-                    count += 1.0;
-                    sum_x += level;
-                    sum_y += square;
-                    sum_xx += level * level;
-                    sum_xy += level * square;
-                }
-            }
+    for (int32_t y = THIN_FIRST; y < p->rows; y += THIN_ROWS) {
+        blend_row(l, l->background, y);
+        const uint16_t *line = l->smooth + (ptrdiff_t)y * l->width;
+        for (int32_t x = THIN_FIRST; x < p->columns; x += THIN_COLUMNS) {
+            const int32_t level = level_at(l, x), size = line[x] < level ? level - line[x] : line[x] - level;
+            l->histogram[size]++;
+            l->samples[samples++] = (Sample){.deviation = size, .level = level};
         }
-        if (pass == 0) limit = fmax(4.0 * (SIGMA_OF_MEDIAN * ranked(l->histogram, samples / 2)), 1.0);
+    }
+    const double limit = fmax(4.0 * (SIGMA_OF_MEDIAN * ranked(l->histogram, samples / 2)), 1.0);
+    double count = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+    for (uint32_t i = 0; i < samples; i++) {
+        if (l->samples[i].deviation > limit) continue;
+        const double level = l->samples[i].level, square = (double)l->samples[i].deviation * l->samples[i].deviation;
+        count += 1.0;
+        sum_x += level;
+        sum_y += square;
+        sum_xx += level * level;
+        sum_xy += level * square;
     }
     const double centre = sum_x / count / KERNEL_SUM, total = sum_y / count / KERNEL_SQUARE_SUM;
     const double spread = (sum_xx - sum_x * sum_x / count) / (double)(KERNEL_SUM * KERNEL_SUM);

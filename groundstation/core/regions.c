@@ -7,38 +7,76 @@
 
 #include <string.h>
 
-enum { BLOCK_PX = 16 };
+enum { HALF_PX = CELL_PX / 2 };
 
-/* Whether any pixel of a block is above threshold. */
-static inline int is_any_lit(const uint16_t *restrict smooth, const uint16_t *restrict threshold)
+/* The least threshold in a cell: pixels lie between its centre and those of its neighbours. */
+static uint16_t least_threshold(const Levels *l, int32_t i, int32_t j)
 {
-    uint16_t any = 0;
-    for (int k = 0; k < BLOCK_PX; k++) any |= (uint16_t)-(smooth[k] > threshold[k]);
-    return any != 0;
+    uint16_t least = UINT16_MAX;
+    for (int32_t row = j > 0 ? j - 1 : 0; row <= j + 1 && row < l->cells_down; row++)
+        for (int32_t column = i > 0 ? i - 1 : 0; column <= i + 1 && column < l->cells_across; column++) {
+            const uint16_t threshold = l->threshold[row * l->cells_across + column];
+            least = threshold < least ? threshold : least;
+        }
+    return least;
 }
 
-/* Cut the lit pixels of a row into runs, the row's levels being in levels->row; 0 where there are too many. */
-GS_CLONES
-static int cut_row(const Levels *l, int32_t y, Regions *r)
+/* List the cells of a row of cells that may hold lit pixels; few do. */
+static void list_bright_cells(const Levels *l, int32_t j, Regions *r)
 {
-    const uint16_t *smooth = l->smooth + (ptrdiff_t)y * l->width;
-    Run *open = NULL;
-    for (int32_t begin = 0; begin < l->width; begin += BLOCK_PX) {
-        if (!is_any_lit(smooth + begin, l->row + begin)) {
-            open = NULL;
-            continue;
+    r->bright_cells = 0;
+    for (int32_t i = 0; i < l->cells_across; i++) {
+        if (l->brightest[j * l->cells_across + i] > least_threshold(l, i, j)) r->bright_cell[r->bright_cells++] = i;
+    }
+}
+
+/* Whether any of the pixels of half a cell is brighter than a level. */
+static inline int is_any_brighter(const uint16_t *pixel, int32_t level)
+{
+    typedef int16_t Half __attribute__((vector_size(HALF_PX * sizeof(int16_t))));
+    typedef int64_t Words __attribute__((vector_size(HALF_PX * sizeof(int16_t))));
+    Half value; /* smoothed pixels are below 2^15 */
+    memcpy(&value, pixel, sizeof value);
+    const Words brighter = (Words)(value > (Half){0} + (int16_t)(level < INT16_MAX ? level : INT16_MAX));
+    return (brighter[0] | brighter[1]) != 0;
+}
+
+/* Add the lit pixels of half a cell to the runs; 0 where there are too many. Between the centres of two cells, whose
+ * thresholds times 32 are given, the threshold is a line; `part` is where on it the first pixel lies. */
+static int cut_half_cell(const uint16_t *smooth, int32_t begin, int32_t y, const int32_t between[2], int32_t part,
+                         Regions *r)
+{
+    int32_t level1024 = between[0] * (32 - part) + between[1] * part;
+    const int32_t slope = 2 * (between[1] - between[0]);
+    Run *open = r->runs > 0 ? r->run + r->runs - 1 : NULL;
+    for (int32_t x = begin; x < begin + HALF_PX; x++, level1024 += slope) {
+        if (smooth[x] <= rounded_level(level1024)) continue;
+        if (++r->lit > r->max_lit) return 0;
+        if (open == NULL || open->row != y || open->last != x - 1) {
+            open = r->run + r->runs;
+            *open = (Run){.row = y, .first = x, .last = x, .parent = r->runs++};
         }
-        for (int32_t x = begin; x < begin + BLOCK_PX; x++) {
-            if (smooth[x] <= l->row[x]) {
-                open = NULL;
-                continue;
-            }
-            if (++r->lit > r->max_lit) return 0;
-            if (open == NULL) {
-                open = r->run + r->runs;
-                *open = (Run){.row = y, .first = x, .last = x, .parent = r->runs++};
-            }
-            open->last = x;
+        open->last = x;
+    }
+    return 1;
+}
+
+/* Cut the lit pixels of a row into runs; 0 where there are too many. */
+static int cut_row(Levels *l, int32_t y, Regions *r)
+{
+    if (r->bright_cells == 0) return 1;
+    const uint16_t *smooth = l->smooth + (ptrdiff_t)y * l->width;
+    blend_row(l, l->threshold, y);
+    for (int32_t i = 0; i < r->bright_cells; i++) {
+        const int32_t cell = r->bright_cell[i];
+        for (int32_t half = 0; half < 2; half++) {
+            const int32_t begin = cell * CELL_PX + half * HALF_PX;
+            const int32_t before = cell - 1 + half, left = before < 0 ? 0 : before;
+            const int32_t right = before + 1 < l->cells_across ? before + 1 : before;
+            const int32_t between[2] = {l->blend[left], l->blend[right]};
+            const int32_t least = (between[0] < between[1] ? between[0] : between[1]) >> 5;
+            if (!is_any_brighter(smooth + begin, least)) continue;
+            if (!cut_half_cell(smooth, begin, y, between, half ? 1 : HALF_PX * 2 + 1, r)) return 0;
         }
     }
     return 1;
@@ -83,7 +121,7 @@ static void number_groups(Regions *r)
 static void add_pixel(const Picture *p, const Levels *l, Regions *r, int32_t x, int32_t y)
 {
     const int32_t number = r->row_group[x] - 1;
-    const int32_t raw = p->pixel[y * p->stride + x], background = level_at(l, l->background, x, y);
+    const int32_t raw = p->pixel[y * p->stride + x], background = level_at(l, x);
     const int32_t light = KERNEL_SUM * raw - background;
     Group *group = r->group + number;
     group->peak = group->size == 0 || light > group->peak ? light : group->peak;
@@ -95,9 +133,11 @@ static void add_pixel(const Picture *p, const Levels *l, Regions *r, int32_t x, 
 }
 
 /* Collect the pixels of one row: those in or beside a run of this row or its neighbours. */
-static void collect_row(const Picture *p, const Levels *l, Regions *r, int32_t y)
+static void collect_row(const Picture *p, Levels *l, Regions *r, int32_t y)
 {
+    if (r->row_run[y > 0 ? y - 1 : 0] == r->row_run[y + 2 < p->rows ? y + 2 : p->rows]) return;
     int32_t next[3], end[3];
+    blend_row(l, l->background, y);
     for (int32_t k = 0; k < 3; k++) {
         const int32_t row = y + k - 1, inside = row >= 0 && row < p->rows;
         next[k] = inside ? r->row_run[row] : 0;
@@ -126,7 +166,7 @@ int find_regions(const Picture *p, Levels *l, Regions *r)
     r->lit = r->runs = r->groups = r->pixels = 0;
     for (int32_t y = 0; y < p->rows; y++) {
         r->row_run[y] = r->runs;
-        level_row(l, l->threshold, y);
+        if (y % CELL_PX == 0) list_bright_cells(l, y / CELL_PX, r);
         if (!cut_row(l, y, r)) return 0;
         r->row_run[y + 1] = r->runs;
         if (y > 0) join_rows(r, y);

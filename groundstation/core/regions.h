@@ -30,6 +30,8 @@ typedef struct {
 typedef struct {
     int32_t max_lit;  /* with more lit pixels the picture is flooded; room for so many runs and groups */
     int32_t lit, runs, groups, pixels;
+    int32_t bright_cells;
+    int32_t *bright_cell; /* those of the present row of cells that may hold lit pixels: cells_across */
     Run *run;          /* max_lit */
     int32_t *row_run;  /* first run of each row: rows + 1 */
     Group *group;      /* max_lit */

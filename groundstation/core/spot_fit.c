@@ -9,8 +9,11 @@
 #include "gaussian.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { STEPS = 2, TILE = 32 };
+
+enum { MAX_FIT_PX = 2000 }; /* what covers more is a lamp or a window, no star: its moments do */
 
 static const double PI = 3.14159265358979323846;
 static const double ROOT_2PI = 2.50662827463100050242;
@@ -29,18 +32,26 @@ typedef struct {
     double cosine, sine, half_px, width_px; /* of a line of light, blurred by the round image of a star */
 } Image;
 
-/* Some pixels of a spot: the image there, and its derivatives by the centre. */
+/* Some pixels of a spot, the last ones repeated with weight zero. */
+typedef struct {
+    double du[TILE], dv[TILE], light[TILE], floor[TILE], usable[TILE];
+} Tile;
+
+/* The image there, and its derivatives by the centre. */
 typedef struct {
     double unit[TILE], by_u[TILE], by_v[TILE];
 } Patch;
+
+/* Four sums side by side: one order of addition, whatever the width of the machine's vectors. */
+typedef double Four __attribute__((vector_size(4 * sizeof(double))));
 
 /* Normal equations for centre and light. */
 typedef struct {
     double uu, uv, vv, uf, vf, ff, gu, gv, gf;
 } Normal;
 
-static inline double larger(double a, double b) { return a > b ? a : b; }
-static inline double smaller(double a, double b) { return a < b ? a : b; }
+GS_INLINE double larger(double a, double b) { return a > b ? a : b; }
+GS_INLINE double smaller(double a, double b) { return a < b ? a : b; }
 static inline double half_sum(Symmetric m) { return 0.5 * (m.uu + m.vv); }
 static inline double half_spread(Symmetric m)
 {
@@ -153,7 +164,7 @@ static Image image_of(Symmetric s, const FittedSpot *f)
 }
 
 /* Gaussian: norm exp(-d' S^-1 d / 2). */
-static inline void gaussian_patch(const Image *m, const double *restrict du, const double *restrict dv, Patch *restrict out)
+GS_INLINE void gaussian_patch(const Image *m, const double *restrict du, const double *restrict dv, Patch *restrict out)
 {
     for (int i = 0; i < TILE; i++) {
         const double along_u = m->a * du[i] + m->b * dv[i], along_v = m->b * du[i] + m->c * dv[i];
@@ -166,64 +177,101 @@ static inline void gaussian_patch(const Image *m, const double *restrict du, con
 
 /* Line of half length h blurred by a Gaussian of width w: across it a Gaussian, along it the difference of two normal
  * distributions, [N((t + h) / w) - N((t - h) / w)] / 2h. */
-static inline void line_patch(const Image *m, const double *restrict du, const double *restrict dv, Patch *restrict out)
+GS_INLINE void line_patch(const Image *m, const double *restrict du, const double *restrict dv, Patch *restrict out)
 {
-    const double w = m->width_px, length = 2.0 * m->half_px;
+    /* Factors, not divisors: a division takes as long as ten products. */
+    const double per_w = 1.0 / m->width_px, per_length = 0.5 / m->half_px;
+    const double side_norm = per_w / ROOT_2PI, slope_norm = per_length * per_w / ROOT_2PI;
     for (int i = 0; i < TILE; i++) {
-        const double along = du[i] * m->cosine + dv[i] * m->sine, across = (dv[i] * m->cosine - du[i] * m->sine) / w;
-        const double front = (along + m->half_px) / w, back = (along - m->half_px) / w;
+        const double along = du[i] * m->cosine + dv[i] * m->sine;
+        const double across = (dv[i] * m->cosine - du[i] * m->sine) * per_w;
+        const double front = (along + m->half_px) * per_w, back = (along - m->half_px) * per_w;
         const double at_front = exponential(-0.5 * front * front), at_back = exponential(-0.5 * back * back);
-        const double profile = (normal_below(front, at_front) - normal_below(back, at_back)) / length;
-        const double slope = (at_back - at_front) / (length * w * ROOT_2PI);
-        const double side = exponential(-0.5 * across * across) / (w * ROOT_2PI);
-        const double by_along = slope * side, by_across = profile * side * across / w;
+        const double profile = (normal_below(front, at_front) - normal_below(back, at_back)) * per_length;
+        const double slope = (at_back - at_front) * slope_norm;
+        const double side = exponential(-0.5 * across * across) * side_norm;
+        const double by_along = slope * side, by_across = profile * side * across * per_w;
         out->unit[i] = profile * side;
         out->by_u[i] = by_along * m->cosine - by_across * m->sine;
         out->by_v[i] = by_along * m->sine + by_across * m->cosine;
     }
 }
 
+static void fill_tile(const SpotPixels *p, const Spot *s, int32_t begin, const double at[3], Tile *t)
+{
+    const int32_t left = s->size - begin, size = left < TILE ? left : TILE, first = s->first + begin;
+    for (int32_t i = 0; i < size; i++) {
+        t->du[i] = p->u_px[first + i] - at[0];
+        t->dv[i] = p->v_px[first + i] - at[1];
+        t->light[i] = p->light_dn[first + i];
+        t->floor[i] = p->variance_dn2[first + i];
+        t->usable[i] = p->usable[first + i];
+    }
+    for (int32_t i = size; i < TILE; i++) {
+        t->du[i] = t->du[0];
+        t->dv[i] = t->dv[0];
+        t->light[i] = t->light[0];
+        t->floor[i] = t->floor[0];
+        t->usable[i] = 0.0;
+    }
+}
+
+/* Residuals and weights of the pixels; in the last step outliers have none. */
+GS_INLINE void weigh(const Tile *restrict t, const Patch *restrict m, double flux, double gain, int is_last,
+                     double *restrict error, double *restrict weight)
+{
+    for (int i = 0; i < TILE; i++) {
+        const double model = flux * m->unit[i], misfit = MISFIT_RATIO * model;
+        const double variance = t->floor[i] + gain * larger(model, 0.0);
+        const double limit2 = OUTLIER_SIGMAS * OUTLIER_SIGMAS * variance + misfit * misfit;
+        error[i] = t->light[i] - model;
+        weight[i] = !is_last || error[i] * error[i] < limit2 ? t->usable[i] / variance : 0.0;
+    }
+}
+
+static double total(const Four *sums) { return ((*sums)[0] + (*sums)[1]) + ((*sums)[2] + (*sums)[3]); }
+
 /* Sum up the normal equations of one spot at (u, v, flux). */
 GS_CLONES
 static void sum_normal(const SpotPixels *p, const Spot *s, double gain, const Image *m, const double at[3], int is_last,
                        Normal *out)
 {
-    Normal n = {0};
+    Four uu = {0}, uv = {0}, vv = {0}, uf = {0}, vf = {0}, ff = {0}, gu = {0}, gv = {0}, gf = {0};
+    Tile tile;
     Patch patch;
-    double du[TILE], dv[TILE];
-    const double flux = at[2];
+    double error[TILE], weight[TILE];
     for (int32_t begin = 0; begin < s->size; begin += TILE) {
-        const int32_t left = s->size - begin, size = left < TILE ? left : TILE, first = s->first + begin;
-        for (int32_t i = 0; i < TILE; i++) {
-            const int32_t k = first + (i < size ? i : 0);
-            du[i] = p->u_px[k] - at[0];
-            dv[i] = p->v_px[k] - at[1];
-        }
+        fill_tile(p, s, begin, at, &tile);
         if (m->is_line)
-            line_patch(m, du, dv, &patch);
+            line_patch(m, tile.du, tile.dv, &patch);
         else
-            gaussian_patch(m, du, dv, &patch);
-        for (int32_t i = 0; i < size; i++) {
-            const double model = flux * patch.unit[i], error = p->light_dn[first + i] - model;
-            const double variance = p->variance_dn2[first + i] + gain * larger(model, 0.0);
-            const double misfit = MISFIT_RATIO * model;
-            const double limit2 = OUTLIER_SIGMAS * OUTLIER_SIGMAS * variance + misfit * misfit;
-            const int used = !is_last || error * error < limit2;
-            const double weight = used ? p->usable[first + i] / variance : 0.0;
-            const double d_u = flux * patch.by_u[i], d_v = flux * patch.by_v[i];
-            const double w_u = weight * d_u, w_v = weight * d_v, w_f = weight * patch.unit[i];
-            n.uu += w_u * d_u;
-            n.uv += w_u * d_v;
-            n.vv += w_v * d_v;
-            n.uf += w_u * patch.unit[i];
-            n.vf += w_v * patch.unit[i];
-            n.ff += w_f * patch.unit[i];
-            n.gu += w_u * error;
-            n.gv += w_v * error;
-            n.gf += w_f * error;
+            gaussian_patch(m, tile.du, tile.dv, &patch);
+        weigh(&tile, &patch, at[2], gain, is_last, error, weight);
+        for (int i = 0; i < TILE; i += 4) {
+            Four w, e, unit, d_u, d_v;
+            memcpy(&w, weight + i, sizeof w);
+            memcpy(&e, error + i, sizeof e);
+            memcpy(&unit, patch.unit + i, sizeof unit);
+            memcpy(&d_u, patch.by_u + i, sizeof d_u);
+            memcpy(&d_v, patch.by_v + i, sizeof d_v);
+            d_u *= at[2];
+            d_v *= at[2];
+            const Four w_u = w * d_u, w_v = w * d_v, w_f = w * unit;
+            uu += w_u * d_u;
+            uv += w_u * d_v;
+            vv += w_v * d_v;
+            uf += w_u * unit;
+            vf += w_v * unit;
+            ff += w_f * unit;
+            gu += w_u * e;
+            gv += w_v * e;
+            gf += w_f * e;
         }
     }
-    *out = n;
+    *out = (Normal){
+        .uu = total(&uu), .uv = total(&uv), .vv = total(&vv), .uf = total(&uf), .vf = total(&vf),
+        .ff = total(&ff), .gu = total(&gu), .gv = total(&gv), .gf = total(&gf),
+    };
 }
 
 /* One Gauss-Newton step: the light eliminated, the 2x2 system of the centre solved. 0 where it cannot be trusted. */
@@ -249,7 +297,7 @@ static void fit_spot(const SpotPixels *p, double gain, const Spot *s, FittedSpot
     const Image image = image_of(s->shape_px2, f);
     double at[3] = {s->u_px, s->v_px, s->flux_dn};
     Symmetric cov = s->cov_px2;
-    int trusted = 1;
+    int trusted = s->size <= MAX_FIT_PX;
     for (int k = 0; k < STEPS && trusted; k++) {
         Normal normal;
         sum_normal(p, s, gain, &image, at, k == STEPS - 1, &normal);

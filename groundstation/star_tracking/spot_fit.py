@@ -1,4 +1,4 @@
-"""Sub-pixel centres of spots from their pixels."""
+"""Sub-pixel centres of spots from their pixels; ``core/spot_fit.c`` has the same formulas."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +18,7 @@ _MAX_STEP_PX = 2.0
 _OUTLIER_SIGMAS = 5.0
 _MISFIT_RATIO = 0.3  # the true image is no Gaussian: so much of the model is no outlier
 _STREAK_RATIO2 = 2.0  # long over short axis, squared, from where a spot counts as a streak
+_MAX_FIT_PX = 2000  # what covers more is a lamp or a window, no star: its moments do
 _TRUNCATION = 1.12  # second moments over a finite footprint come out this much too small
 _WIDTH2_LIMITS_PX2 = (0.3, 16.0)
 
@@ -216,7 +217,7 @@ def _gauss_newton(
     u, v, flux = guess.u_px.copy(), guess.v_px.copy(), guess.flux_dn.copy()
     usable = ~pixels.is_saturated
     cov = guess.cov_px2
-    trusted = np.ones(len(u), dtype=bool)
+    trusted = pixels.size <= _MAX_FIT_PX
     for step in range(_STEPS):
         du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
         along_u, along_v = a * du + b * dv, b * du + c * dv

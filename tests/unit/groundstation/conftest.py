@@ -1,5 +1,7 @@
 """The compiled core for tests: that of the tree, or a fresh one where that is stale."""
 
+from pathlib import Path
+
 import pytest
 
 from groundstation.core.build import CoreBuildError, compile_core, is_fresh
@@ -7,7 +9,10 @@ from groundstation.core.library import load_core
 
 
 @pytest.fixture(scope="session")
-def compiled_core(tmp_path_factory):
+def compiled_core(request, tmp_path_factory):
+    chosen = request.config.getoption("--core-library")
+    if chosen:
+        return load_core(Path(chosen))
     if is_fresh():
         return load_core()
     try:

@@ -116,6 +116,14 @@ def test_a_whole_frame_has_the_same_spots(both, painter):
     assert blurred.elongation.max() > 2.0
 
 
+def test_a_lamp_is_centred_by_its_moments(both):
+    image = sky(np.random.default_rng(7), (240, 320), 10, 12.0, flux=(1000.0, 3000.0))
+    lamp = cv2.line(np.zeros_like(image), (60, 80), (250, 130), 120, 14)  # a tube of 2800 pixels
+    spots = assert_equal_spots(both, np.maximum(image, lamp))
+    assert abs(spots.u_px[0] - 155.0) + abs(spots.v_px[0] - 105.0) < 1.0
+    assert spots.flux_dn[0] > 1e5
+
+
 @pytest.mark.parametrize("shape", [(32, 32), (33, 47), (100, 32), (48, 640), (241, 323)])
 def test_sizes_that_no_cell_divides(both, shape):
     assert len(assert_equal_spots(both, sky(np.random.default_rng(5), shape, 4, 12.0))) > 0
