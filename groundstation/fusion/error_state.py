@@ -1,5 +1,7 @@
 """The 23 error states of the filter: what they mean, how they start and how they age.
 
+Behind them stand the slopes at the nodes of the learned surface, of which WAVE_X, WAVE_Y are the local value.
+
 Notation: theta heading, v and p velocity and position of the IMU point in the table frame, w rate, f specific
 force at the IMU point in body axes, R(theta) = table_from_body. Between packets
 
@@ -12,8 +14,6 @@ The error of an estimate is true minus nominal, additive in every component.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,9 +72,9 @@ def initial_variance(noise: NoiseModel) -> Array:
 
 
 def move(P: Array, F: Array, Q: Array) -> None:
-    """Carry the covariance P (23, 23) over a segment in place, given its five moving rows."""
-    rows = F @ P
-    corner = rows @ F.T + Q
+    """Carry the covariance P (N, N) over a segment in place, given its five moving rows F (5, 23)."""
+    rows = F @ P[:SIZE]
+    corner = rows[:, :SIZE] @ F.T + Q
     P[:MOVING] = rows
     P[:, :MOVING] = rows.T
     P[:MOVING, :MOVING] = 0.5 * (corner + corner.T)
@@ -94,46 +94,3 @@ def age(P: Array, duration_s: float, noise: NoiseModel) -> None:
     walked = noise.acc_bias_walk_m_s2_rts**2 * duration_s
     P[ACC_BIAS_X, ACC_BIAS_X] += walked
     P[ACC_BIAS_Y, ACC_BIAS_Y] += walked
-
-
-def full_transition(rows: Array, keep: float) -> Array:
-    """Return the transition (23, 23) of a segment: five moving rows, a fading wave, constants."""
-    F = np.eye(SIZE)
-    F[:MOVING] = rows
-    F[WAVE_X, WAVE_X] = F[WAVE_Y, WAVE_Y] = keep
-    return F
-
-
-def forget_wave(x: Array, P: Array, anchor_m: Array, noise: NoiseModel) -> float:
-    """Let what is known of the local slope fade with the distance from where it was learned, in place.
-
-    The slope is a smooth field over the table, not a process in time: a vehicle that hovers keeps what it
-    learned, one that travels loses it as exp(-d^2 / 2 l^2). The law of a smooth field is no Markov chain, so
-    the distance counts from an anchor that is dropped anew after each length l; the result does not depend on
-    how often this is called.
-
-    Args:
-        x: (23,) nominal state where the vehicle is now.
-        P: (23, 23) its covariance.
-        anchor_m: (3,) x, y of the anchor and the largest distance from it so far; updated.
-        noise: sigma and length of the waviness.
-
-    Returns:
-        The share of it that was kept.
-    """
-    length = noise.waviness_length_m
-    away = math.hypot(x[PX] - anchor_m[0], x[PY] - anchor_m[1])
-    if away <= anchor_m[2]:
-        return 1.0
-    keep = math.exp(-0.5 * (away**2 - anchor_m[2] ** 2) / length**2)
-    anchor_m[2] = away
-    if away > length:
-        anchor_m[:] = x[PX], x[PY], 0.0
-    wave = slice(WAVE_X, WAVE_Y + 1)
-    x[wave] *= keep
-    P[wave] *= keep
-    P[:, wave] *= keep
-    fresh = noise.waviness_sigma_m_s2**2 * (1.0 - keep * keep)
-    P[WAVE_X, WAVE_X] += fresh
-    P[WAVE_Y, WAVE_Y] += fresh
-    return keep

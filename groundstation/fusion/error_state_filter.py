@@ -20,11 +20,13 @@ from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.force_doubt import ForceDoubt
+from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.reckoner import Reckoner
 from groundstation.fusion.slope_grid import SlopeGrid
-from groundstation.fusion.trace import Carried, Chain, Corrected, Trace
+from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace
+from groundstation.fusion.valve_knocks import add_knocks
 
 STEP_S = 1.0
 """Longest stretch over which the local slope is held; an outage is covered in several."""
@@ -32,6 +34,8 @@ REOPENED_VELOCITY_M_S = 0.1
 """Sigma of the velocity after the filter found itself lost: faster than anything flies on a table."""
 MAX_AHEAD_S = 1.0
 """A fix whose exposure is further ahead of the packets has a wrong stamp."""
+LOOK_S = 1.0
+"""While no fix comes, how long the local slope is taken to be what it was."""
 WAITS = "waits for packets"
 CANDIDATE = "waits for a second fix"
 CANDIDATE_AGE_S = 5.0
@@ -57,10 +61,11 @@ class ErrorStateFilter:
         self._trace = trace
         self.counters = Counters()
         self.x = es.initial_state(noise)
-        """(23,) nominal state at the checkpoint."""
+        """(23 + 2m,) nominal state at the checkpoint, m nodes of the surface."""
         self.P = np.diag(es.initial_variance(noise))
-        """(23, 23) covariance there."""
-        self._anchor = np.zeros(3)
+        """(23 + 2m, 23 + 2m) covariance there."""
+        self._surface = LearnedSurface.untouched(noise)
+        self._looked_s = 0.0
         self._reckoner = Reckoner(noise, self.counters, table_map)
         self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
         self._candidates: list[Fix] = []
@@ -95,6 +100,8 @@ class ErrorStateFilter:
             return None
         if self._waiting:
             self._retry()
+        if reckoner.newest_s > self._looked_s + LOOK_S:
+            self._integrate_to_now()
         return reckoner.report() if reckoner.has_pose else None
 
     def state(self) -> PlanarState | None:
@@ -103,10 +110,9 @@ class ErrorStateFilter:
 
     def covariance(self) -> Array:
         """Return (6, 6) of x, y, heading, vx, vy, omega of the centre of mass now."""
-        x, P = self.x.copy(), self.P.copy()
-        self._propagate(x, P, self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        _, x, P = self._propagate(self._reckoner.checkpoint_s, self._reckoner.newest_s)
         H = measurements.reported(x, self._reckoner.omega_rad_s)
-        C: Array = H @ P @ H.T
+        C: Array = H @ P[: es.SIZE, : es.SIZE] @ H.T
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
         return C
 
@@ -178,25 +184,26 @@ class ErrorStateFilter:
             return self._consider(fix, t)
         if t <= reckoner.checkpoint_s:
             return self._refuse(fix, "older than the last used")
-        x, P = self.x.copy(), self.P.copy()
-        steps: list[Carried | Corrected] = []
-        anchor = self._propagate(x, P, reckoner.checkpoint_s, t, steps)
+        steps: list[Step] = []
+        surface, x, P = self._propagate(reckoner.checkpoint_s, t, steps)
         omega_read = self._reckoner.history.omega_at(t)
         z, H = measurements.predict_fix(fix, x, omega_read, self.noise)
-        S = H @ P @ H.T + measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
+        PH = P[:, : es.SIZE] @ H.T
+        S = H @ PH[: es.SIZE]
+        S += measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
         weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
         nis = float(z @ weight @ z)
         if nis > self.noise.gate_nis:
             return self._contradicted(fix, t, z, nis)
         creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - reckoner.checkpoint_s)
-        K = P @ H.T @ weight
+        K = PH @ weight
         x += K @ z
         P -= K @ S @ K.T
         P[es.GYRO_BIAS, es.GYRO_BIAS] += creeping
         reckoner.is_lost = False
         if self._trace is not None:
             self._trace.chains[-1].steps += [*steps, Corrected(H, K, weight, z)]
-        self._accept(t, x, P, anchor)
+        self._accept(t, x, P, surface)
         return FixAccount(fix.t_exposure_ns, True, "used", float(z[0]), float(z[1]), float(z[2]), nis)
 
     def _refuse(self, fix: Fix, reason: str) -> FixAccount:
@@ -257,33 +264,43 @@ class ErrorStateFilter:
         rest = self._rest_of(t)
         sigma = REOPENED_VELOCITY_M_S if rest is None else measurements.REST_VELOCITY_M_S
         measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
+        surface, x, P = self._first_look(x, P)
         if rest is not None:
             self._learn(x, P, self._reckoner.history.between(rest[0], t))
         self._reckoner.has_pose = True
         self._begin_chain(t, x, P)
-        self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
+        self._accept(t, x, P, surface)
         self.counters.add("fix_starts_the_estimate")
 
     def _restart(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
         """Take the pose from this fix; what made the filter wrong may sit in the biases, so they open too."""
-        x = self.x.copy()
+        x = self.x[: es.SIZE].copy()
         P = np.diag(np.minimum(es.initial_variance(self.noise), es.reopened_variance()))
         measurements.take_pose(fix, x, P, float(x[es.THETA]), REOPENED_VELOCITY_M_S)
+        surface, x, P = self._first_look(x, P)
         self._begin_chain(t, x, P)
-        self._accept(t, x, P, np.array([x[es.PX], x[es.PY], 0.0]))
+        self._accept(t, x, P, surface)
         self._creep.forget()
         self.counters.add("fix_starts_the_estimate_again")
         return FixAccount(
             fix.t_exposure_ns, True, "starts the estimate again", float(z[0]), float(z[1]), float(z[2]), nis
         )
 
+    def _first_look(self, x: Array, P: Array) -> tuple[LearnedSurface, Array, Array]:
+        surface, x, P, _ = look(
+            LearnedSurface.untouched(self.noise), x, P, x[es.PX : es.PY + 1].copy(), self.noise
+        )
+        return surface, x, P
+
     def _begin_chain(self, t: float, x: Array, P: Array) -> None:
         if self._trace is not None:
-            self._trace.chains.append(Chain(t, x.copy(), P.copy(), self._rest_of(t) is not None))
+            self._trace.chains.append(
+                Chain(t, x[: es.SIZE].copy(), P[: es.SIZE].copy(), self._rest_of(t) is not None)
+            )
 
-    def _accept(self, t: float, x: Array, P: Array, anchor: Array) -> None:
+    def _accept(self, t: float, x: Array, P: Array, surface: LearnedSurface) -> None:
         """Make the corrected state at `t` the checkpoint and integrate from it to now."""
-        self.x, self.P, self._anchor = x, 0.5 * (P + P.T), anchor
+        self.x, self.P, self._surface = x, 0.5 * (P + P.T), surface
         self._reckoner.checkpoint_s = t
         self._refused.clear()
         self._rests = [r for r in self._rests if r[1] > t]
@@ -293,37 +310,34 @@ class ErrorStateFilter:
         self._integrate_to_now()
 
     def _propagate(
-        self,
-        x: Array,
-        P: Array,
-        start_s: float,
-        stop_s: float,
-        steps: list[Carried | Corrected] | None = None,
-    ) -> Array:
-        """Carry x and P from `start_s` to `stop_s` in place, through flight and rest; return the anchor."""
-        anchor = self._anchor.copy()
+        self, start_s: float, stop_s: float, steps: list[Step] | None = None
+    ) -> tuple[LearnedSurface, Array, Array]:
+        """Return surface, state and covariance carried from the checkpoint `start_s` to `stop_s`."""
+        surface, x, P = self._surface, self.x.copy(), self.P.copy()
         for a, b, resting in self._stretches(start_s, stop_s):
             segment = self._reckoner.history.between(a, b)
             if resting:
-                F = measurements.stand(x, P)
+                rows = measurements.stand(x, P)
                 es.age(P, b - a, self.noise)
             elif len(segment.span_s):
+                surface, x, P, looked = look(surface, x, P, _ahead(x, 0.5 * (b - a)), self.noise)
                 flight = fly(x, segment, self._lag_difference_s, self._map)
                 rows = transition(segment, flight)
-                noise = moving_noise(segment, flight, self.noise)
+                Q = moving_noise(segment, flight, self.noise)
+                add_knocks(Q, segment, flight, self.noise)
                 unseen = self._doubt.noise(a, b, float(x[es.THETA] + 0.5 * flight.turned[-1]))
-                es.move(P, rows, noise if unseen is None else noise + unseen)
+                es.move(P, rows, Q if unseen is None else Q + unseen)
                 x[: es.MOVING] = flight.moved
                 es.age(P, flight.duration_s, self.noise)
-                keep = es.forget_wave(x, P, anchor, self.noise)
-                F = es.full_transition(rows, keep)
+                if steps is not None and self._trace is not None:
+                    steps.append(looked)
             else:
                 continue
             if steps is not None and self._trace is not None:
-                steps.append(Carried(b, F, x.copy(), P.copy(), resting))
+                steps.append(Carried(b, rows, x[: es.SIZE].copy(), P[: es.SIZE].copy(), resting))
             if resting and (learned := self._learn(x, P, segment)) is not None and steps is not None:
                 steps.append(learned)
-        return anchor
+        return surface, x, P
 
     @property
     def history(self) -> PacketHistory:
@@ -333,9 +347,8 @@ class ErrorStateFilter:
     def finish(self) -> None:
         """Write down the way from the last used fix to the newest packet, for the smoother."""
         if self._trace is not None and self._trace.chains:
-            steps: list[Carried | Corrected] = []
-            reckoner = self._reckoner
-            self._propagate(self.x.copy(), self.P.copy(), reckoner.checkpoint_s, reckoner.newest_s, steps)
+            steps: list[Step] = []
+            self._propagate(self._reckoner.checkpoint_s, self._reckoner.newest_s, steps)
             self._trace.chains[-1].steps += steps
 
     def _learn(self, x: Array, P: Array, segment: Segment) -> Corrected | None:
@@ -365,16 +378,24 @@ class ErrorStateFilter:
         """Run the nominal state from the checkpoint to now, and prepare the reported sigmas."""
         if not self._reckoner.has_pose:
             return
-        x = self.x.copy()
+        x, here = self.x.copy(), slice(es.WAVE_X, es.WAVE_Y + 1)
         for a, b, resting in self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s):
             segment = self._reckoner.history.between(a, b)
             if resting:
                 x[es.VX : es.VY + 1] = 0.0
             elif len(segment.span_s):
+                x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a)))
                 x[: es.MOVING] = fly(x, segment, self._lag_difference_s, self._map).moved
-        self._reckoner.load(x, x[: es.MOVING])
+        x[here] = self._surface.slope(x, _ahead(x, 0.5 * LOOK_S))
+        self._looked_s = self._reckoner.newest_s
+        self._reckoner.load(x[: es.SIZE], x[: es.MOVING])
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
         self._reckoner.variance = measurements.variance_in_time(self.x, self.P, noise)
 
     def _seconds(self, t_ns: int) -> float:
         return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9
+
+
+def _ahead(x: Array, time_s: float) -> Array:
+    """Return the place (2,) where the vehicle will be."""
+    return np.asarray(x[es.PX : es.PY + 1] + time_s * x[es.VX : es.VY + 1])

@@ -96,15 +96,15 @@ def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_si
 
 
 def stand(x: Array, P: Array) -> Array:
-    """Stop the vehicle in place: velocity zero, as known as can be; return the transition (23, 23)."""
+    """Stop the vehicle in place: velocity zero, as known as can be; return the transition's rows (5, 23)."""
     v = slice(es.VX, es.VY + 1)
     x[v] = 0.0
     P[v] = 0.0
     P[:, v] = 0.0
     P[es.VX, es.VX] = P[es.VY, es.VY] = REST_VELOCITY_M_S**2
-    F = np.eye(es.SIZE)
-    F[v] = 0.0
-    return F
+    rows = np.eye(es.MOVING, es.SIZE)
+    rows[v] = 0.0
+    return rows
 
 
 class RestDisturbed(ValueError):  # noqa: N818 - it is a finding about the data
@@ -155,9 +155,10 @@ def learn_rest(
             x[es.ACC_BIAS_Y] + x[es.ACC_TEMPCO_Y] * warmth - (c * gy - s * gx),
         ]
     )
-    S = H @ P @ H.T + np.diag(sigma**2 / n)
+    PH = P[:, : es.SIZE] @ H.T
+    S = H @ PH[: es.SIZE] + np.diag(sigma**2 / n)
     weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
-    K = P @ H.T @ weight
+    K = PH @ weight
     z = readings.mean(axis=1) - expected
     x += K @ z
     P -= K @ S @ K.T
@@ -198,7 +199,7 @@ def variance_in_time(x: Array, P: Array, noise: NoiseModel) -> list[float]:
     L[5, es.ACC_BIAS_X], L[5, es.ACC_BIAS_Y] = -s, -c
     L[4, [es.SLOPE_X, es.WAVE_X]] = 1.0
     L[5, [es.SLOPE_Y, es.WAVE_Y]] = 1.0
-    C = L @ P @ L.T
+    C = L @ P[: es.SIZE, : es.SIZE] @ L.T
     white = noise.acc_density_m_s2_rthz**2 / 3.0
     out: list[float] = []
     for p, v, a in ((0, 2, 4), (1, 3, 5)):

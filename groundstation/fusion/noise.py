@@ -55,10 +55,12 @@ class NoiseModel:
 
     slope_sigma_m_s2: float = 3e-3
     """Mean tilt of the table as gravity along it (9.8 mm/s^2 per mrad)."""
-    waviness_sigma_m_s2: float = 2.8e-4
-    """Local departure from the mean slope."""
-    waviness_length_m: float = 0.12
-    """Distance over which the local slope is nearly one number (of a Gaussian correlation)."""
+    waviness_sigma_m_s2: float = 2.2e-4
+    """Local departure from the mean slope, per axis."""
+    waviness_length_m: float = 0.2
+    """Of the height's Gaussian correlation: waves of half a metre to a metre."""
+    valve_knock_m_s: float = 3.5e-5
+    """What accelerometers read, as a change of velocity, when a valve switches and nothing moves by it."""
 
     gyro_lag_s: float = 0.0
     """Time constant of the gyro's low-pass, 1 / (2 pi f)."""

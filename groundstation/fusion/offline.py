@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from groundstation.fusion import error_state as es
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.noise import NoiseModel
@@ -75,7 +76,7 @@ class OfflineSmoother:
 
     def sigmas(self) -> Array:
         """Return (23,) sigmas of the error states at the last used fix, causal."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self._filter.P), 0.0)))
+        return np.asarray(np.sqrt(np.maximum(np.diag(self._filter.P)[: es.SIZE], 0.0)))
 
     def finish(self) -> Smoothed:
         """End the recording and smooth it."""

@@ -1,8 +1,6 @@
 """The offline smoother: every packet's state from all fixes, before and after.
 
-The filter's trace is walked backwards with the modified Bryson-Frazier recursion (Bierman, "Fixed interval
-smoothing with discrete measurements", Int. J. Control 18, 1973), which needs no inverse of a covariance: many
-of these are singular, because a rest knows the velocity and some calibration states are certain.
+The filter's trace is walked backwards (`walk_back`).
 Between the ends of two steps the packets are integrated from the smoothed start; what is missing at the end
 is spread as a cubic, which is the mean of an integrated random walk tied at both ends.
 """
@@ -22,22 +20,10 @@ from groundstation.fusion.flight import fly
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.slope_grid import SlopeGrid
-from groundstation.fusion.trace import Carried, Chain, Trace
+from groundstation.fusion.trace import Trace
+from groundstation.fusion.walk_back import Node, smooth_chain
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Node:
-    """Smoothed state at the end of one step."""
-
-    t_s: float
-    x: Array
-    """(23,)."""
-    P: Array
-    """(23, 23)."""
-    is_rest: bool
-    """Whether the step that ends here was one of rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,29 +37,6 @@ class Smoothed:
     std: Array
     """(n, 3) of x, y, heading."""
     nodes: list[Node]
-
-
-def smooth_chain(chain: Chain) -> list[Node]:
-    """Return the smoothed states at the start of a chain and at the end of each of its steps."""
-    lam, Lam = np.zeros(es.SIZE), np.zeros((es.SIZE, es.SIZE))
-    nodes: list[Node] = []
-    for step in reversed(chain.steps):
-        if isinstance(step, Carried):
-            nodes.append(_node(step.stop_s, step.x, step.P, lam, Lam, is_rest=step.is_rest))
-            lam = step.F.T @ lam
-            Lam = step.F.T @ Lam @ step.F
-        else:
-            C = np.eye(es.SIZE) - step.K @ step.H
-            lam = C.T @ lam - step.H.T @ (step.weight @ step.z)
-            Lam = C.T @ Lam @ C + step.H.T @ step.weight @ step.H
-    nodes.append(_node(chain.start_s, chain.x, chain.P, lam, Lam, is_rest=chain.is_rest))
-    nodes.reverse()
-    return nodes
-
-
-def _node(t_s: float, x: Array, P: Array, lam: Array, Lam: Array, *, is_rest: bool) -> Node:
-    smoothed = P - P @ Lam @ P
-    return Node(t_s, x - P @ lam, 0.5 * (smoothed + smoothed.T), is_rest)
 
 
 def smooth(

@@ -1,4 +1,7 @@
-"""What the filter did, step by step, so that a smoother can walk it backwards."""
+"""What the filter did, step by step, so that a smoother can walk it backwards.
+
+N is the length of the state at that step: 23, and two for each node of the learned surface.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,28 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Looked:
+    """The local slope was taken anew from the surface's nodes, after one was given up and one was added."""
+
+    weights: Array
+    """(2, N - 23) of the nodes' slopes, the added one among them."""
+    grown: Array | None
+    """(2, N - 25): the added node's slope from the others', if one was added."""
+    dropped: int | None
+    """The node that was given up before, if one was."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """The state was carried to `stop_s` by x = F x + noise."""
+    """The state was carried to `stop_s`: five moving rows changed, the others stayed."""
 
     stop_s: float
-    F: Array
-    """(23, 23)."""
+    rows: Array
+    """(5, 23) of the transition."""
     x: Array
     """(23,) after the step."""
     P: Array
-    """(23, 23) after the step."""
+    """(23, N) of the covariance after the step."""
     is_rest: bool
 
 
@@ -31,11 +46,14 @@ class Corrected:
     H: Array
     """(m, 23)."""
     K: Array
-    """(23, m) gain."""
+    """(N, m) gain."""
     weight: Array
     """(m, m) inverse of the innovation's covariance."""
     z: Array
     """(m,) innovation."""
+
+
+Step = Looked | Carried | Corrected
 
 
 @dataclass(slots=True, eq=False)
@@ -44,9 +62,11 @@ class Chain:
 
     start_s: float
     x: Array
+    """(23,)."""
     P: Array
+    """(23, N)."""
     is_rest: bool
-    steps: list[Carried | Corrected] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
 
 
 class Trace:

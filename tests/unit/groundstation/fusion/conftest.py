@@ -1,6 +1,6 @@
 """Data with truth for the fusion tests, made by the laboratory in tools/fusion_truth.py."""
 
-import importlib.util
+import importlib
 import sys
 from functools import cache
 from pathlib import Path
@@ -16,11 +16,12 @@ ROOT = Path(__file__).parents[4]
 
 @cache
 def _laboratory() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fusion_truth", ROOT / "tools" / "fusion_truth.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["fusion_truth"] = module
-    spec.loader.exec_module(module)
-    return module
+    tools = str(ROOT / "tools")
+    sys.path.insert(0, tools)  # its parts import each other by name
+    try:
+        return importlib.import_module("fusion_truth")
+    finally:
+        sys.path.remove(tools)
 
 
 @pytest.fixture(scope="session")

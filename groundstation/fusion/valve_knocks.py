@@ -1,0 +1,38 @@
+"""What switching valves add to the noise: a knock that the accelerometers read and nothing moves by."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.fusion.error_state import PX, PY, VX, VY
+from groundstation.fusion.flight import Flight
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.packet_history import Segment
+
+Array = NDArray[np.float64]
+
+STEP_SIGMAS = 8.0
+"""A force that changes by more from packet to packet is a valve, not noise."""
+WINDOW_S = 0.01
+"""Shorter packets are looked at in groups as long: a valve takes some ms to open."""
+
+
+def add_knocks(Q: Array, segment: Segment, flight: Flight, noise: NoiseModel) -> None:
+    """Add to the process covariance Q (5, 5), in place, one knock wherever the force changes abruptly."""
+    group = max(1, round(WINDOW_S / noise.packet_period_s))
+    firsts = np.arange(0, len(segment.span_s) - group + 1, group)
+    if len(firsts) < 2:
+        return
+    force = np.add.reduceat(flight.force_body, firsts, axis=1) / group
+    white = STEP_SIGMAS * noise.acc_density_m_s2_rthz / math.sqrt(group * noise.packet_period_s)
+    left = flight.until_end_s[firsts[1:]][(np.abs(np.diff(force, axis=1)) > white).any(axis=0)]
+    knock = noise.valve_knock_m_s**2
+    vv, vp, pp = knock * len(left), knock * float(left.sum()), knock * float(left @ left)
+    for v, p in ((VX, PX), (VY, PY)):
+        Q[v, v] += vv
+        Q[v, p] += vp
+        Q[p, v] += vp
+        Q[p, p] += pp
