@@ -1,6 +1,7 @@
 """``groundstation star-tracker``: star fixes from frames in a folder, and the sky's calibrations."""
 
 import csv
+import gc
 import io
 import json
 import math
@@ -31,7 +32,7 @@ from groundstation.cli.star_files import (
 )
 from groundstation.cli.star_pictures import PictureFolder
 from groundstation.cli.star_plots import plot_residuals
-from groundstation.star_tracking.detection import Spots, detect
+from groundstation.star_tracking.detection import Detector, Spots, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.sky_adjustment import HEIGHT
@@ -101,11 +102,13 @@ def solve(
     if every_picture and pictures is None:
         raise UsageError("--every-picture needs --pictures, the folder for them.")
     solver = _solver(method, camera, catalogue)
-    solver(np.zeros((camera.height, camera.width), np.uint8))  # the first call pays for lazy imports
+    solver(read_frame(frames[0], camera))  # the first call pays for memory and lazy imports
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
     with ExitStack() as stack:
+        gc.freeze()  # else the collector now and then looks at every loaded module: 20 ms in a frame's time
+        stack.callback(gc.unfreeze)
         drawn = None
         if pictures is not None:
             drawn = PictureFolder(
@@ -242,8 +245,8 @@ def _solver(
     if method is Method.PUBLISHED:
         published = PublishedTracker(catalogue, camera)
         return lambda image: published.solve(detect(image))
-    tracker = StarTracker(catalogue, camera)
-    return lambda image: tracker.solve(detect(image))
+    tracker, detector = StarTracker(catalogue, camera), Detector()
+    return lambda image: tracker.solve(detector.find(image))
 
 
 def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
