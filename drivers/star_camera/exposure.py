@@ -8,7 +8,7 @@ _NS_PER_S = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class ExposureDelay:
-    """Span from the middle of the exposure to the arrival of the picture's last byte on the host.
+    """Span from the middle of the exposure to the picture's stamp: its driver's, else its arrival.
 
     Attributes:
         delay_s: Exposure's half, read-out, transfer and decoding in the camera; from the rig or calibration.
@@ -24,6 +24,6 @@ class ExposureDelay:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is a span of at least 0 s, got {value}")
 
-    def middle_ns(self, stamp_arrival_ns: int) -> int:
+    def middle_ns(self, stamp_ns: int) -> int:
         """Stamp of the middle of the exposure; uncertain by `delay_std_s`."""
-        return stamp_arrival_ns - round(self.delay_s * _NS_PER_S)
+        return stamp_ns - round(self.delay_s * _NS_PER_S)

@@ -143,7 +143,9 @@ class StarCamera:
                 picture = self._source.read()
                 with self._news:
                     number = self._received if picture.sequence is None else picture.sequence
-                    self._newest = CameraFrame(picture.image, picture.stamp_arrival_ns, number)
+                    self._newest = CameraFrame(
+                        picture.image, picture.stamp_arrival_ns, number, picture.stamp_device_ns
+                    )
                     self._received += 1
                     self._heard_s = time.monotonic()
                     self._news.notify_all()

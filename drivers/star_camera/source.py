@@ -11,6 +11,7 @@ import time
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Protocol
 from urllib.parse import urlsplit
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import LinkLost, NotFound
+from drivers.star_camera.device_stamp import device_stamp_ns, offset_utc_ns
 from drivers.star_camera.multipart import PartParser, boundary_of
 from drivers.star_camera.picture import decode_picture, to_colour, to_mono
 
@@ -28,11 +30,12 @@ _READ_BYTES = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A picture, when its last byte was read, and its number where the sender counts."""
+    """A picture, when its last byte was read, and its number and stamp where the sender gives them."""
 
     image: NDArray[np.uint8]
     stamp_arrival_ns: int
     sequence: int | None = None
+    stamp_device_ns: int | None = None
 
 
 class PictureSource(Protocol):
@@ -77,6 +80,7 @@ class HttpSource:
             )
             self._connection.connect()
             self._socket = self._connection.sock
+            self._is_of_this_host = ip_address(self._socket.getpeername()[0]).is_loopback
             self._connection.request("GET", path, headers={"Accept": "multipart/x-mixed-replace"})
             self._response = self._connection.getresponse()
         except (OSError, ValueError, http.client.HTTPException) as error:
@@ -128,7 +132,15 @@ class HttpSource:
         except ValueError:
             self.garbled += 1
             return
-        self._ready.append(Picture(image, stamp_ns, int(sequence) if sequence.isdecimal() else None))
+        number = int(sequence) if sequence.isdecimal() else None
+        device_ns = _stamp_in(headers, stamp_ns) if self._is_of_this_host else None
+        self._ready.append(Picture(image, stamp_ns, number, device_ns))
+
+
+def _stamp_in(headers: dict[str, str], arrival_ns: int) -> int | None:
+    with suppress(ValueError):  # no header, or no number in it: the arrival has to do
+        return device_stamp_ns(float(headers.get("x-timestamp", "")), arrival_ns, offset_utc_ns())
+    return None
 
 
 class VideoSource:
@@ -158,10 +170,13 @@ class VideoSource:
             with self._reading:
                 is_there, image = self._capture.read()
                 stamp_ns = time.monotonic_ns()
+                # V4L2's stamp of the buffer; other back ends tell the place in the stream, which is no stamp
+                device_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) * 1e-3
             if not is_there:
                 raise LinkLost(f"star camera {self.name} gives no more pictures")
+            device_ns = device_stamp_ns(device_s, stamp_ns, offset_utc_ns()) if device_s > 0.0 else None
             try:
-                return Picture(self._convert(image), stamp_ns)
+                return Picture(self._convert(image), stamp_ns, None, device_ns)
             except ValueError:
                 self.garbled += 1
 

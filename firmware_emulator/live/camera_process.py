@@ -31,6 +31,8 @@ from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
 NS_PER_S = 1_000_000_000
+NICENESS = 10
+"""On a busy machine bytes, filters and valves go first; a late picture still says when it was taken."""
 _MAX_ORDERS = 64  # more than a second of the slowest pipeline; behind that, old pictures give way to new ones
 
 
@@ -47,7 +49,7 @@ class LiveCamera:
         self._jpeg_quality = jpeg_quality
         self._changed = threading.Condition()
         self._orders: deque[Exposure | TableExposure] = deque(maxlen=_MAX_ORDERS)
-        self._newest: tuple[int, NDArray[np.uint8]] | None = None
+        self._newest: tuple[int, int, NDArray[np.uint8]] | None = None
         self._published = 0
         threading.Thread(target=self._work, daemon=True).start()
 
@@ -57,16 +59,16 @@ class LiveCamera:
             self._orders.append(exposure)
             self._changed.notify_all()
 
-    def wait(self, seen: int) -> tuple[int, int, NDArray[np.uint8]]:
-        """Block for a picture newer than number `seen`; return its number, sequence and image."""
+    def wait(self, seen: int) -> tuple[int, int, int, NDArray[np.uint8]]:
+        """Block for a picture newer than number `seen`; return its number, sequence, stamp (ns) and image."""
         with self._changed:
             self._changed.wait_for(lambda: self._published > seen)
             if self._newest is None:
                 raise RuntimeError("published without a picture")
             return self._published, *self._newest
 
-    def part(self, sequence: int, image: NDArray[np.uint8], is_jpeg: bool) -> bytes:
-        """One part of the multipart stream."""
+    def part(self, sequence: int, stamp_ns: int, image: NDArray[np.uint8], is_jpeg: bool) -> bytes:
+        """One part of the multipart stream, stamped as camera servers do."""
         height, width = image.shape[:2]
         if is_jpeg:
             kind = "image/jpeg"
@@ -76,7 +78,8 @@ class LiveCamera:
             body = image.tobytes()
         head = (
             f"--{BOUNDARY}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
-            f"X-Width: {width}\r\nX-Height: {height}\r\nX-Sequence: {sequence}\r\n\r\n"
+            f"X-Width: {width}\r\nX-Height: {height}\r\nX-Sequence: {sequence}\r\n"
+            f"X-Timestamp: {stamp_ns / NS_PER_S:.6f}\r\n\r\n"
         )
         return head.encode("ascii") + body + b"\r\n"
 
@@ -89,7 +92,7 @@ class LiveCamera:
             # real time is this process's work: a frame leaves when a camera would have sent it
             time.sleep(max(0, exposure.arrival_ns - time.monotonic_ns()) / NS_PER_S)
             with self._changed:
-                self._newest = (exposure.sequence, image)
+                self._newest = (exposure.sequence, exposure.arrival_ns, image)
                 self._published += 1
                 self._changed.notify_all()
 
@@ -117,8 +120,8 @@ def make_server(cameras: dict[str, LiveCamera], port: int = 0) -> ThreadingHTTPS
             seen = 0
             try:
                 while True:
-                    seen, sequence, image = camera.wait(seen)
-                    self.wfile.write(camera.part(sequence, image, is_jpeg))
+                    seen, sequence, stamp_ns, image = camera.wait(seen)
+                    self.wfile.write(camera.part(sequence, stamp_ns, image, is_jpeg))
             except OSError:  # the client left: its right
                 return
 
@@ -135,6 +138,7 @@ def make_server(cameras: dict[str, LiveCamera], port: int = 0) -> ThreadingHTTPS
 def main(port: int) -> int:
     """Serve on a port (0: a free one) until stdin ends."""
     cv2.setNumThreads(1)
+    os.nice(NICENESS)
     cameras: dict[str, LiveCamera] = {}
     try:
         for row in json.loads(sys.stdin.readline()):

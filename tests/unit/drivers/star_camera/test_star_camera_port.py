@@ -7,8 +7,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers.errors import LinkLost, NotFound
+from drivers.star_camera.device_stamp import device_stamp_ns
 from drivers.star_camera.port import StarCamera
 from drivers.star_camera.source import FolderSource, Picture, VideoSource
 
@@ -19,11 +22,12 @@ def picture(value):
     return np.full((24, 32), value, np.uint8)
 
 
-def raw_part(image, number):
+def raw_part(image, number, *headers):
     head = (
         "--frame\r\nContent-Type: application/x-mono8\r\n"
         f"X-Width: {image.shape[1]}\r\nX-Height: {image.shape[0]}\r\nX-Sequence: {number}\r\n"
-        f"Content-Length: {image.size}\r\n\r\n"
+        + "".join(f"{header}\r\n" for header in headers)
+        + f"Content-Length: {image.size}\r\n\r\n"
     )
     return head.encode() + image.tobytes() + b"\r\n"
 
@@ -124,6 +128,48 @@ def test_a_picture_is_read_once_and_its_stamp_is_its_arrival():
         hand.give(1)
         frame = camera.read()
         assert before_ns <= frame.stamp_arrival_ns <= time.monotonic_ns()
+
+
+@pytest.mark.parametrize("clock_s", [time.monotonic, time.time])
+def test_a_stamp_of_a_server_on_this_host_counts_instead_of_the_arrival(clock_s):
+    ready = threading.Event()
+    taken_ns, said_s = time.monotonic_ns() - 500_000_000, clock_s() - 0.5
+    part = raw_part(picture(7), 0, f"X-Timestamp: {said_s:.6f}")
+    with serve(Script(part, ready)) as url, StarCamera.open(url) as camera:
+        frame = camera.read(PATIENCE_S)
+        assert abs(frame.stamp_ns - taken_ns) < 10_000_000  # two clocks read one after the other
+        assert frame.stamp_arrival_ns - taken_ns >= 500_000_000
+        ready.set()
+
+
+@pytest.mark.parametrize(
+    "header", ["X-Timestamp: soon", "X-Timestamp: 12.5", "X-Timestamp: nan", "X-Other: 1"]
+)
+def test_without_a_believable_stamp_the_arrival_counts(header):
+    ready = threading.Event()
+    with serve(Script(raw_part(picture(7), 0, header), ready)) as url, StarCamera.open(url) as camera:
+        frame = camera.read(PATIENCE_S)
+        assert frame.stamp_device_ns is None
+        assert frame.stamp_ns == frame.stamp_arrival_ns
+        ready.set()
+
+
+@given(
+    age_ns=st.integers(-(10**10), 10**10),
+    arrival_ns=st.integers(10**12, 10**15),
+    offset_ns=st.integers(10**18, 2 * 10**18),
+    is_utc=st.booleans(),
+)
+def test_a_stamp_is_believed_on_either_clock_if_it_lies_shortly_before_the_arrival(
+    age_ns, arrival_ns, offset_ns, is_utc
+):
+    said_ns = arrival_ns - age_ns + offset_ns * is_utc
+    found_ns = device_stamp_ns(said_ns * 1e-9, arrival_ns, offset_ns)
+    blur_ns = 1000  # of UTC seconds in a float
+    if blur_ns < age_ns < 2_000_000_000 - blur_ns:
+        assert abs(found_ns - (arrival_ns - age_ns)) <= blur_ns
+    elif not -blur_ns <= age_ns <= 2_000_000_000 + blur_ns:
+        assert found_ns is None
 
 
 def test_a_silent_source_is_a_lost_link():
