@@ -1,8 +1,8 @@
 """When a camera's driver had a picture, where it says so: better than when a busy host read it.
 
 V4L2 stamps each buffer by the kernel's monotonic clock; servers such as mjpg-streamer and µStreamer put a
-stamp into the part's header `X-Timestamp`, seconds of the monotonic or of the UTC clock of their host. Which one
-is not said, so a stamp counts only if it lies shortly before the arrival.
+stamp into the part's header `X-Timestamp`, seconds of the monotonic or of the UTC clock of their host. Which
+one is not said, so a stamp counts only if it lies shortly before the arrival.
 """
 
 import math
