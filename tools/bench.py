@@ -1,10 +1,13 @@
-"""Measure what the limits of the project speak of, print the table, say what is missed.
+"""Measure what the limits of the project speak of, print the tables, say what is missed.
 
     make bench
-    python tools/bench.py --only live --live-minutes 10
+    python tools/bench.py --only star fusion
+    python tools/bench.py --only star_lights --trials 3750
+    python tools/bench.py --only star_folder --folder recordings/ceiling
     python tools/bench.py --fresh-clone --live-minutes 10 --write docs/benchmarks.md
 
 Exit code 1 if a limit is missed. Close other programs: on a busy machine a live run measures them.
+--write replaces the tables of the subjects of this run and leaves the others as they are.
 """
 
 import argparse
@@ -18,47 +21,70 @@ from types import MappingProxyType
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy loads: figures are per core
 
-from bench import fresh_clone, live, lockstep_speed, other_benches, parser, station_keeping  # noqa: E402
+import cv2  # noqa: E402
+from bench import fresh_clone, live, lockstep_speed, parser, station_keeping  # noqa: E402
 from bench import table as bench_table  # noqa: E402
+from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
+from bench.fusion import folder as fusion_folder  # noqa: E402
+from bench.fusion import peers as fusion_peers  # noqa: E402
+from bench.fusion import speed as fusion_speed  # noqa: E402
 from bench.rows import Bench, Measure, Row  # noqa: E402
+from bench.star import folder as star_folder  # noqa: E402
+from bench.star import frames as star_frames  # noqa: E402
+from bench.star import lights as star_lights  # noqa: E402
+from bench.star import peers as star_peers  # noqa: E402
+from bench.star import sky as star_sky  # noqa: E402
 from bench.unit import reference_unit_s  # noqa: E402
 from rich.console import Console  # noqa: E402
 
 MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
-        "fresh_clone": fresh_clone.measure,
         "live": live.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
         "parser": parser.measure,
-        "others": other_benches.measure,
+        "star": star_frames.measure,
+        "star_lights": star_lights.measure,
+        "star_sky": star_sky.measure,
+        "star_peers": star_peers.measure,
+        "star_folder": star_folder.measure,
+        "fusion": fusion_accuracy.measure,
+        "fusion_speed": fusion_speed.measure,
+        "fusion_peers": fusion_peers.measure,
+        "fusion_folder": fusion_folder.measure,
+        "fresh_clone": fresh_clone.measure,
     }
 )
-"""THE TABLE of subjects, in the order of the rows."""
-ON_REQUEST = frozenset({"fresh_clone"})
+"""THE TABLE of subjects, in the order of the page."""
+ON_REQUEST = frozenset({"fresh_clone", "star_folder", "fusion_folder"})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:
-    """Measure what was asked for; what breaks is a row that is not ok."""
+    """Measure what was asked for, subject by subject; each is written as soon as it is there."""
     names = arguments.only or [name for name in MEASURES if name not in ON_REQUEST]
     if arguments.fresh_clone and "fresh_clone" not in names:
-        names = ["fresh_clone", *names]
+        names = [*names, "fresh_clone"]
     console = Console(stderr=True)
     rows: list[Row] = []
-    with tempfile.TemporaryDirectory(prefix="bench_") as folder, console.status("reference unit") as status:
-        unit_s = reference_unit_s()
-        bench = Bench(Path(folder), arguments.live_minutes, arguments.seeds, unit_s, status.update)
+    with tempfile.TemporaryDirectory(prefix="bench_") as folder:
         for name in names:
-            status.update(name)
-            found = MEASURES[name](bench)
-            for row in found:
-                status.console.print(" | ".join(row.cells), highlight=False, markup=False, soft_wrap=True)
+            with console.status(name) as status:
+                bench = Bench(
+                    folder=Path(folder),
+                    live_minutes=arguments.live_minutes,
+                    seeds=arguments.seeds,
+                    frames=arguments.frames,
+                    trials=arguments.trials,
+                    data=arguments.folder,
+                    unit_s=reference_unit_s(),
+                    say=status.update,
+                )
+                found = MEASURES[name](bench)
+            said = f"{bench_table.machine()}; {bench.circumstances()}."
+            print(f"\n{name}: {said}\n{bench_table.text(found)}", flush=True)
+            if arguments.write is not None:
+                bench_table.write(arguments.write, {name: bench_table.section(said, found)}, list(MEASURES))
             rows += found
-    circumstances = bench_table.circumstances(unit_s, arguments.live_minutes, arguments.seeds)
-    print(circumstances)
-    print(bench_table.text(rows))
-    if arguments.write is not None:
-        bench_table.write(arguments.write, rows, circumstances)
     return rows
 
 
@@ -68,9 +94,19 @@ def main() -> None:
     words.add_argument("--only", nargs="+", choices=list(MEASURES), help="these subjects only")
     words.add_argument("--fresh-clone", action="store_true", help="also clone, install and fly (minutes)")
     words.add_argument("--live-minutes", type=float, default=1.0, help="length of the live run")
-    words.add_argument("--seeds", type=int, default=3, help="where figures depend on luck")
-    words.add_argument("--write", type=Path, metavar="PAGE", help="put the table into this Markdown page")
-    rows = run(words.parse_args())
+    words.add_argument("--seeds", type=int, default=6, help="flights per scenario, of loop and fusion")
+    words.add_argument("--frames", type=int, default=200, help="star pictures per kind")
+    words.add_argument(
+        "--trials", type=int, default=400, help="pictures per number of random lights, of eight"
+    )
+    words.add_argument("--folder", type=Path, help="data with truth, for star_folder and fusion_folder")
+    words.add_argument("--write", type=Path, metavar="PAGE", help="put the tables into this Markdown page")
+    arguments = words.parse_args()
+    named = {"star_folder", "fusion_folder"} & set(arguments.only or ())
+    if named and (arguments.folder is None or not arguments.folder.is_dir()):
+        words.error(f"{' and '.join(sorted(named))} needs --folder with a data set and its truth.csv")
+    cv2.setNumThreads(1)
+    rows = run(arguments)
     sys.exit(1 if any(row.ok is False for row in rows) else 0)
 
 

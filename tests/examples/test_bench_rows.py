@@ -1,6 +1,5 @@
 """The parts of ``make bench`` that can be wrong without anybody seeing it in the table."""
 
-import importlib
 from pathlib import Path
 
 import pytest
@@ -20,13 +19,6 @@ from groundstation.runtime.slot import Sequences
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def bench(monkeypatch):
-    """Imports a module of tools/bench as tools/bench.py does."""
-    monkeypatch.syspath_prepend(str(ROOT / "tools"))
-    return lambda name: importlib.import_module(f"bench.{name}")
-
-
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "run.mcap"
@@ -39,36 +31,6 @@ def recording(tmp_path_factory):
         runner.run(4_000_000_000)
         runner.close()
     return path
-
-
-def test_a_line_of_another_bench_is_a_row_only_with_four_cells_and_a_verdict(bench):
-    parse = bench("other_benches").parse_row
-    assert parse("fix | 30 ms | 12 ms | yes").ok is True
-    assert parse("| fix | 30 ms | 12 ms | NO |").ok is False
-    assert parse("fix |  | 12 ms | ").ok is None
-    assert parse("what | limit | measured | ok") is None
-    assert parse("solving frame 12 of 300") is None
-
-
-def test_the_page_keeps_everything_outside_its_marks(bench, tmp_path):
-    rows, table = bench("rows"), bench("table")
-    page = tmp_path / "page.md"
-    page.write_text(f"before\n{table.BEGIN}\nold\n{table.END}\nafter\n")
-    table.write(page, [rows.Row("speed", "5x", "9x", ok=True)], "Today.")
-    said = page.read_text()
-    assert said.startswith("before\n")
-    assert said.endswith("\nafter\n")
-    assert "| speed | 5x | 9x | yes |" in said
-    assert "old" not in said
-    assert list(tmp_path.iterdir()) == [page]
-
-
-def test_a_page_without_marks_is_refused_and_left_alone(bench, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("nothing here")
-    with pytest.raises(ValueError, match="needs the marks"):
-        bench("table").write(page, [], "Today.")
-    assert page.read_text() == "nothing here"
 
 
 def test_the_journal_leads_from_a_state_back_to_the_bytes_it_was_made_from(bench, recording):

@@ -39,6 +39,9 @@ class Bench:
         folder: Where it may write; gone afterwards.
         live_minutes: Length of the live run.
         seeds: How many seeds where figures depend on luck.
+        frames: How many star pictures of each kind.
+        trials: How many pictures of each number of random lights.
+        data: Folder with a data set and its truth, where one was named.
         unit_s: CPU seconds of the reference unit on this machine, in this run.
         say: Takes one line about what is going on.
     """
@@ -46,12 +49,22 @@ class Bench:
     folder: Path
     live_minutes: float
     seeds: int
+    frames: int
+    trials: int
+    data: Path | None
     unit_s: float
     say: Callable[[str], None]
 
     def in_units(self, seconds: float) -> str:
         """A CPU time as a multiple of the reference unit, for comparison between machines."""
         return f"{seconds / self.unit_s:.3g} units"
+
+    def circumstances(self) -> str:
+        """The unit and the options, for the head of a table."""
+        return (
+            f"unit {1e3 * self.unit_s:.1f} ms of CPU; {self.live_minutes:g} min live, {self.seeds} seeds, "
+            f"{self.frames} pictures of a kind, {self.trials} of random lights"
+        )
 
 
 Measure = Callable[[Bench], list[Row]]

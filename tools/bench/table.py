@@ -1,15 +1,23 @@
-"""The table as text for a terminal and as Markdown for the page of benchmarks."""
+"""The tables as text for a terminal and as Markdown for the page of benchmarks: one table per subject.
+
+Each subject keeps the circumstances under which it was measured, so that subjects can be measured one by
+one, on a quiet machine, without touching the others' figures.
+"""
 
 import os
 import platform
+import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from bench.rows import Row
 
 HEAD = ("what", "limit", "measured", "ok")
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
+_SECTION = re.compile(r"^### (.+)$", re.MULTILINE)
 
 
 def text(rows: Sequence[Row]) -> str:
@@ -28,27 +36,44 @@ def markdown(rows: Sequence[Row]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def circumstances(unit_s: float, live_minutes: float, seeds: int) -> str:
-    """Date, machine and unit, one sentence."""
+def machine() -> str:
+    """Date and machine, as they stand before a subject's options."""
     return (
         f"{time.strftime('%Y-%m-%d')}, {_processor()}, {os.cpu_count()} cores, {platform.system()} "
-        f"{platform.machine()}, Python {platform.python_version()}; unit {1e3 * unit_s:.1f} ms of CPU; "
-        f"{live_minutes:g} min live, {seeds} seeds."
+        f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}"
     )
 
 
-def write(page: Path, rows: Sequence[Row], said: str) -> None:
-    """Put the table between the marks of a page, atomically.
+def section(said: str, rows: Sequence[Row]) -> str:
+    """What stands below a subject's heading: circumstances and table."""
+    return f"{said}\n\n{markdown(rows)}"
+
+
+def subjects(said: str) -> list[str]:
+    """Subjects that a page has tables of, in its order."""
+    return _SECTION.findall(said.partition(BEGIN)[2].partition(END)[0])
+
+
+def write(page: Path, measured: Mapping[str, str], order: Sequence[str]) -> None:
+    """Put the sections between the marks of a page, atomically; subjects not measured stay as they are.
+
+    Args:
+        page: Markdown with the two marks.
+        measured: Subject to its section.
+        order: Every subject there is; sections of any other are dropped from the page.
 
     Raises:
         ValueError: The page lacks the marks.
     """
     before, begin, rest = page.read_text().partition(BEGIN)
-    _, end, after = rest.partition(END)
+    found, end, after = rest.partition(END)
     if not (begin and end):
         raise ValueError(f"{page} needs the marks {BEGIN} and {END}")
+    parts = _SECTION.split(found)[1:]
+    sections = dict(zip(parts[::2], (part.strip("\n") for part in parts[1::2]), strict=True)) | dict(measured)
+    body = "\n\n".join(f"### {name}\n\n{sections[name]}" for name in order if name in sections)
     part = page.with_name(page.name + ".part")
-    part.write_text(f"{before}{BEGIN}\n{said}\n\n{markdown(rows)}\n{END}{after}")
+    part.write_text(f"{before}{BEGIN}\n{body}\n{END}{after}")
     part.replace(page)
 
 

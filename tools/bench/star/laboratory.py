@@ -1,21 +1,19 @@
-"""Frames of the emulator's sky with truth, and scores over them, for ``bench_star_tracker.py``."""
+"""Pictures of the emulator's sky with their truth."""
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from bench.rows import ROOT
 from calibration.camera import CameraCalibration
 from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
 from firmware_emulator.sky.sensor import SensorSettings
 from firmware_emulator.sky.sky_camera import Shutter, SkyCamera
-from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.sky_adjustment import project
 
-RIG = Path(__file__).resolve().parents[1] / "calibration" / "rigs" / "emulated"
+RIG = ROOT / "calibration" / "rigs" / "emulated"
 CAMERA_FILE, CEILING_FILE = RIG / "camera.json", RIG / "ceiling.csv"
 TAGS = ("easy", "edge", "blur", "false-lights", "leds-out", "mixed", "sparse", "dark")
 Triple = Sequence[float] | np.ndarray
@@ -105,62 +103,6 @@ class Laboratory:
         near = np.hypot(*(self.leds - pose[:2]).T) < 2.0
         kept = self.rng.permutation(np.flatnonzero(inside & near))[:left]
         return np.setdiff1d(np.arange(len(self.leds)), kept)
-
-
-@dataclass
-class Score:
-    """Errors and times of one method."""
-
-    error: list[tuple[str, np.ndarray]]
-    missed: list[str]
-    false: int
-    detect_ms: list[float]
-    solve_ms: list[float]
-    dark_ms: list[float]
-    chi2: list[float]
-
-    def rms(self, tag: str) -> tuple[float, float]:
-        """Position (mm) and heading (deg) of one kind."""
-        errors = np.array([e for t, e in self.error if t == tag])
-        if len(errors) == 0:
-            return float("nan"), float("nan")
-        position = 1e3 * np.sqrt((errors[:, :2] ** 2).sum(axis=1).mean())
-        return float(position), float(np.degrees(np.sqrt((errors[:, 2] ** 2).mean())))
-
-    def rate(self, tag: str) -> float:
-        """Share of one kind that was identified."""
-        found = sum(t == tag for t, _ in self.error)
-        return found / max(found + sum(t == tag for t in self.missed), 1)
-
-
-def run(frames: list[Frame], solve: Callable[[Spots], object]) -> Score:
-    """Solve every frame; a fix outside 20 mm or 1 deg, or on a dark sky, is false."""
-    score = Score([], [], 0, [], [], [], [])
-    for frame in frames:
-        begin = time.process_time()
-        spots = detect(frame.image)
-        middle = time.process_time()
-        answer = solve(spots)
-        end = time.process_time()
-        score.detect_ms.append(1e3 * (middle - begin))
-        score.solve_ms.append(1e3 * (end - middle))
-        is_fix = isinstance(answer, StarFix)
-        if frame.pose is None:
-            score.false += is_fix
-            score.dark_ms.append(1e3 * (end - begin))
-            continue
-        if not is_fix:
-            score.missed.append(frame.tag)
-            continue
-        error = np.array([answer.x_m - frame.pose[0], answer.y_m - frame.pose[1], 0.0])
-        error[2] = np.angle(np.exp(1j * (answer.heading_rad - frame.pose[2])))
-        if np.hypot(error[0], error[1]) > 0.02 or abs(error[2]) > np.radians(1.0):
-            score.false += 1
-            score.missed.append(frame.tag)
-            continue
-        score.error.append((frame.tag, error))
-        score.chi2.append(float(error @ np.linalg.solve(answer.cov, error)) / 3.0)
-    return score
 
 
 def spots_at(uv: np.ndarray, sigma_px: float = 0.03) -> Spots:

@@ -1,0 +1,1 @@
+"""The star tracker on the emulator's sky, beside other methods on the same pictures."""

@@ -1,0 +1,85 @@
+"""A ceiling of printed squares, ArUco or AprilTag, drawn and solved for the same camera and poses."""
+
+import time
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.star.laboratory import Frame
+from bench.star.rigid import rigid_pose
+from bench.star.score import Answer, Score
+from bench.unit import blur_s
+from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.rays import ceiling_points
+
+KINDS = {"ArUco 4x4": cv2.aruco.DICT_4X4_50, "AprilTag 36h11": cv2.aruco.DICT_APRILTAG_36h11}
+"""OpenCV's dictionaries; its detector reads both."""
+SQUARE_M, PITCH_M, COLUMNS, COUNT = 0.15, 0.6, 8, 48
+INK_DN, PAPER_DN, NOISE_DN, BLUR_PX = 20.0, 170.0, 2.0, 0.7
+_FINE = 3
+
+
+class SquareCeiling:
+    """8 x 6 squares of 0.15 m, 0.6 m apart: 40 corners in a picture, about as many as LEDs."""
+
+    def __init__(self, name: str, camera: CameraCalibration, catalogue: StarCatalogue) -> None:
+        self._dictionary = cv2.aruco.getPredefinedDictionary(KINDS[name])
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        self._detector = cv2.aruco.ArucoDetector(self._dictionary, settings)
+        self._camera = camera
+        x, y = float(catalogue.x_m.min()), float(catalogue.y_m.min())
+        number = np.arange(COUNT)
+        self._centre = np.column_stack((number % COLUMNS, number // COLUMNS)) * PITCH_M + (x + 0.2, y + 0.2)
+        half = 0.5 * SQUARE_M
+        self._corner = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+
+    def score(self, frames: Sequence[Frame], say: Callable[[str], None]) -> Score:
+        """Draw the squares at the frames' poses and solve; the whole time counts as solving."""
+        rng, score = np.random.default_rng(9), Score()
+        for number, frame in enumerate(frames):
+            say(f"star: squares, {number} of {len(frames)} pictures")
+            image = self._draw(np.asarray(frame.pose), rng)
+            unit = 1e3 * blur_s(image)
+            begin = time.process_time()
+            answer = self._solve(image)
+            score.take(frame, answer, unit, 0.0, 1e3 * (time.process_time() - begin))
+        return score
+
+    def _draw(self, pose: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.uint8]:
+        height, width = self._camera.height, self._camera.width
+        v, u = np.indices((height * _FINE, width * _FINE), dtype=float)
+        u, v = (u.ravel() + 0.5) / _FINE - 0.5, (v.ravel() + 0.5) / _FINE - 0.5
+        q, _ = ceiling_points(self._camera, u, v)
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        x = pose[0] + c * q[:, 0] - s * q[:, 1]
+        y = pose[1] + s * q[:, 0] + c * q[:, 1]
+        picture = np.full(len(x), PAPER_DN)
+        for number, centre in enumerate(self._centre):
+            dx, dy = x - centre[0], y - centre[1]
+            mine = (np.abs(dx) < 0.5 * SQUARE_M) & (np.abs(dy) < 0.5 * SQUARE_M)
+            if not mine.any():
+                continue
+            tile = cv2.aruco.generateImageMarker(self._dictionary, number, 120)
+            column = ((dx[mine] / SQUARE_M + 0.5) * 119.99).astype(int)
+            row = ((dy[mine] / SQUARE_M + 0.5) * 119.99).astype(int)
+            picture[mine] = INK_DN + (PAPER_DN - INK_DN) / 255.0 * tile[row, column]
+        fine = picture.reshape(height * _FINE, width * _FINE)
+        small = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+        image = cv2.GaussianBlur(small, (0, 0), BLUR_PX) + rng.normal(0.0, NOISE_DN, small.shape)
+        return np.clip(image, 0, 255).astype(np.uint8)
+
+    def _solve(self, image: NDArray[np.uint8]) -> Answer | None:
+        corners, numbers, _ = self._detector.detectMarkers(image)
+        if numbers is None or len(numbers) == 0:
+            return None
+        known = np.asarray(numbers).ravel()
+        inside = known < COUNT
+        if not inside.any():
+            return None
+        uv = np.concatenate([c.reshape(4, 2) for c, ok in zip(corners, inside, strict=True) if ok])
+        q, _ = ceiling_points(self._camera, uv[:, 0].astype(float), uv[:, 1].astype(float))
+        goal = np.concatenate([self._centre[n] + self._corner for n in known[inside]])
+        return rigid_pose(q @ np.array([1.0, 1j]), goal @ np.array([1.0, 1j]))
