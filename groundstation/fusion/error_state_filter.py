@@ -13,9 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from groundstation.core.library import Core, default_core
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
+from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.flight import fly, moving_noise, transition
@@ -23,7 +25,6 @@ from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
-from groundstation.fusion.reckoner import Reckoner
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace
 from groundstation.fusion.valve_knocks import add_knocks
@@ -51,10 +52,15 @@ class ErrorStateFilter:
         noise: sensors and table of this mock-up.
         trace: where to write down every step for a smoother; all packets are then kept.
         table_map: what calibration knows of the table's slope; the filter estimates what is left of it.
+        core: compiled core or ``PURE``; the default is the compiled one where there is one. Equal answers.
     """
 
     def __init__(
-        self, noise: NoiseModel, trace: Trace | None = None, table_map: SlopeGrid | None = None
+        self,
+        noise: NoiseModel,
+        trace: Trace | None = None,
+        table_map: SlopeGrid | None = None,
+        core: Core | None = None,
     ) -> None:
         self.noise = noise
         self._map = table_map
@@ -66,7 +72,7 @@ class ErrorStateFilter:
         """(23 + 2m, 23 + 2m) covariance there."""
         self._surface = LearnedSurface.untouched(noise)
         self._looked_s = 0.0
-        self._reckoner = Reckoner(noise, self.counters, table_map)
+        self._reckoner = make_reckoner(noise, self.counters, table_map, core or default_core())
         self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
         self._candidates: list[Fix] = []
         self._rests: list[tuple[float, float]] = []

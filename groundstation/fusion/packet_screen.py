@@ -17,14 +17,14 @@ class PacketScreen:
     not. The limits are the rig's: largest force and torque over mass and inertia, plus noise.
     """
 
-    __slots__ = ("_full_acc", "_full_rate", "_last", "_max_acc", "_max_rate", "_suspect")
+    __slots__ = ("_full_acc", "_full_rate", "_last", "_suspect", "max_acc_step", "max_rate_step")
 
     def __init__(self, noise: NoiseModel) -> None:
         self._full_rate = noise.full_scale_rad_s
         self._full_acc = noise.full_scale_m_s2
         per_packet = NOISE_SIGMAS * math.sqrt(2.0 / noise.packet_period_s)
-        self._max_acc = noise.max_acc_step_m_s2 + per_packet * noise.acc_density_m_s2_rthz
-        self._max_rate = noise.max_rate_step_rad_s + per_packet * noise.gyro_density_rad_s_rthz
+        self.max_acc_step = noise.max_acc_step_m_s2 + per_packet * noise.acc_density_m_s2_rthz
+        self.max_rate_step = noise.max_rate_step_rad_s + per_packet * noise.gyro_density_rad_s_rthz
         self._last: tuple[float, float, float] | None = None
         self._suspect: tuple[float, float, float] | None = None
 
@@ -40,7 +40,7 @@ class PacketScreen:
                 return True
             self._last = (omega, ax, ay)
             return False
-        rate, force = self._max_rate, self._max_acc
+        rate, force = self.max_rate_step, self.max_acc_step
         if (
             -rate <= omega - last[0] <= rate
             and -force <= ax - last[1] <= force

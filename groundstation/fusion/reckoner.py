@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.fusion import error_state as es
+from groundstation.fusion.backward_stamps import BackwardStamps
 from groundstation.fusion.estimator import Counters, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
@@ -23,10 +24,6 @@ STAMP_GAIN = 0.02
 """Share of a stamp's difference from the ticks that is followed; smooths the jitter of the stamps."""
 MAX_STAMP_JITTER_S = 0.02
 """A stamp that is further from its tick than this is not jitter: the clock or the sensor jumped."""
-BACKWARD_PACKETS = 20
-"""Stamps in a row behind the newest one after which the clock, not the packets, is taken to have changed."""
-
-
 LOOKUP_EVERY = 8
 """Packets between look-ups of the table's map; a vehicle moves millimetres meanwhile."""
 
@@ -41,12 +38,12 @@ class Reckoner:
     """
 
     __slots__ = (
-        "_acc_lag", "_ax", "_ay", "_backward", "_backward_ns", "_bax", "_bay", "_bg", "_counters",
+        "_acc_lag", "_ax", "_ay", "_backward", "_bax", "_bay", "_bg", "_counters",
         "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
         "_mxx", "_mxy", "_myx", "_myy", "_omega_read", "_period", "_px", "_py", "_reference_c",
-        "_rx", "_ry", "_screen", "_temperature_c", "_theta", "_until_lookup", "_vx", "_vy",
-        "_warmth", "_x", "checkpoint_s", "has_pose", "history", "is_lost", "newest_ns", "newest_s",
-        "omega_rad_s", "origin_ns", "rest_from_s", "rest_to_s", "variance",
+        "_rx", "_ry", "_screen", "_slope_x", "_slope_y", "_temperature_c", "_theta", "_until_lookup",
+        "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "has_pose", "history", "is_lost", "newest_ns",
+        "newest_s", "omega_rad_s", "origin_ns", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
@@ -71,7 +68,7 @@ class Reckoner:
         self.omega_rad_s = 0.0
         self._omega_read = self._ax = self._ay = 0.0
         self._force_x = self._force_y = 0.0
-        self._backward = self._backward_ns = 0
+        self._backward = BackwardStamps()
         self._warmth = 0.0
         self._temperature_c = self._reference_c = math.nan
         self._theta = self._vx = self._vy = self._px = self._py = 0.0
@@ -103,7 +100,7 @@ class Reckoner:
             t += off
             dt = t - self.newest_s
         self.newest_ns, self.newest_s = t_ns, t
-        self._backward = 0
+        self._backward.count = 0
         if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
             self._warm(temperature_c)
         hole = 0.0
@@ -128,17 +125,15 @@ class Reckoner:
             self._until_lookup -= 1
             if self._until_lookup < 0:
                 self._until_lookup = LOOKUP_EVERY
-                self._unpack()
+                self._look_up()
         return True
 
     def _clock_restarted(self, t_ns: int) -> bool:
         """Count a stamp that lies behind; many in a row are a clock that jumped back, and are followed."""
         self._counters.add("packet_stamp_not_after_the_last")
-        self._backward += 1
-        if self._backward < BACKWARD_PACKETS or t_ns <= self._backward_ns:
-            self._backward_ns = t_ns
+        if not self._backward.is_restart(t_ns):
             return False
-        missed = self._backward * self._period
+        missed = self._backward.count * self._period
         self.origin_ns = t_ns - round((self.newest_s + missed) * 1e9)
         self._counters.add("clock_jumped_back")
         self._screen.forget()
@@ -218,20 +213,28 @@ class Reckoner:
         if math.isnan(self._reference_c):
             self._reference_c = temperature_c
         self._warmth = temperature_c - self._reference_c
-        self._unpack()
+        self._correct_for_warmth()
 
     def _unpack(self) -> None:
+        x = self._x
+        self._gyro_gain = 1.0 - x[es.GYRO_SCALE]
+        self._mxx, self._mxy = 1.0 - x[es.ACC_MATRIX], x[es.ACC_MATRIX + 1]
+        self._myx, self._myy = x[es.ACC_MATRIX + 2], 1.0 - x[es.ACC_MATRIX + 3]
+        self._slope_x = x[es.SLOPE_X] + x[es.WAVE_X]
+        self._slope_y = x[es.SLOPE_Y] + x[es.WAVE_Y]
+        self._rx, self._ry = x[es.LEVER_X], x[es.LEVER_Y]
+        self._correct_for_warmth()
+        self._look_up()
+
+    def _correct_for_warmth(self) -> None:
         x, warmth = self._x, self._warmth
         self._bg = x[es.GYRO_BIAS] + x[es.GYRO_TEMPCO] * warmth
         self._bax = x[es.ACC_BIAS_X] + x[es.ACC_TEMPCO_X] * warmth
         self._bay = x[es.ACC_BIAS_Y] + x[es.ACC_TEMPCO_Y] * warmth
-        self._gyro_gain = 1.0 - x[es.GYRO_SCALE]
-        self._mxx, self._mxy = 1.0 - x[es.ACC_MATRIX], x[es.ACC_MATRIX + 1]
-        self._myx, self._myy = x[es.ACC_MATRIX + 2], 1.0 - x[es.ACC_MATRIX + 3]
-        self._gx = x[es.SLOPE_X] + x[es.WAVE_X]
-        self._gy = x[es.SLOPE_Y] + x[es.WAVE_Y]
+
+    def _look_up(self) -> None:
+        self._gx, self._gy = self._slope_x, self._slope_y
         if self._map is not None:
             known_x, known_y = self._map.at(self._px, self._py)
             self._gx += known_x
             self._gy += known_y
-        self._rx, self._ry = x[es.LEVER_X], x[es.LEVER_Y]
