@@ -3,6 +3,9 @@
 A heading that arrived at ``t`` was true at ``t - delay``. With G the integral of the gyro's rate the
 model is ``heading = G(t - delay) + offset + bias t``; delay, offset and gyro bias are least squares.
 Its spread comes from the residuals: the turn has to change for the delay to be seen at all.
+
+One delay serves all pictures, but each may come a little earlier or later. That jitter shows as
+residuals that grow with the turn rate: ``variance = heading^2 + (rate jitter)^2`` is fitted to them.
 """
 
 from dataclasses import dataclass
@@ -14,6 +17,7 @@ Array = NDArray[np.float64]
 
 _CLIP_SIGMAS = 4.0
 _STEPS = 20
+_JITTER_ROUNDS = 4
 _MIN_HEADINGS = 10
 
 
@@ -23,16 +27,20 @@ class CameraDelay:
 
     Attributes:
         delay_s: Arrival minus exposure.
-        std_s: One sigma.
+        std_s: One sigma of it, the same for all pictures.
+        jitter_s: One sigma by which single pictures differ from it; 0 where the residuals show none.
         gyro_bias_rad_s: To subtract from the gyro's rate.
         residual_rad: Heading minus model, of the used fixes.
+        rate_rad_s: Turn rate at these fixes' exposures.
         used: Which headings were not clipped.
     """
 
     delay_s: float
     std_s: float
+    jitter_s: float
     gyro_bias_rad_s: float
     residual_rad: Array
+    rate_rad_s: Array
     used: NDArray[np.bool_]
 
 
@@ -87,4 +95,23 @@ def camera_delay(
     std = float(np.sqrt(variance * np.linalg.inv(normal)[0, 0]))
     whole = np.zeros(len(arrival_t_s), dtype=bool)
     whole[np.flatnonzero(inside)[used]] = True
-    return CameraDelay(float(delay), std, -float(bias), residual[used], whole)
+    rate = np.interp(times[used] - delay, gyro_t_s, rate_rad_s)
+    jitter = _jitter_s(residual[used], rate)
+    return CameraDelay(float(delay), std, jitter, -float(bias), residual[used], rate, whole)
+
+
+def _jitter_s(residual_rad: Array, rate_rad_s: Array) -> float:
+    """Fit ``residual^2 = a + b rate^2`` with weights of its own scatter; the root of b, 0 if it is none."""
+    square, rate2 = residual_rad**2, rate_rad_s**2
+    expected = np.full(len(square), float(square.mean()))
+    slope = slope_std = 0.0
+    for _ in range(_JITTER_ROUNDS):
+        weight = 1.0 / np.maximum(expected, 1e-12) ** 2  # a square of a Gaussian scatters like its mean
+        design = np.stack((np.ones_like(rate2), rate2), axis=1)
+        normal = design.T @ (weight[:, None] * design)
+        if np.linalg.cond(normal) > 1e15:
+            return 0.0
+        level, slope = np.linalg.solve(normal, design.T @ (weight * square))
+        slope_std = float(np.sqrt(2.0 * np.linalg.inv(normal)[1, 1]))
+        expected = np.maximum(level, 0.05 * float(square.mean())) + max(slope, 0.0) * rate2
+    return float(np.sqrt(slope)) if slope > 2.0 * slope_std else 0.0

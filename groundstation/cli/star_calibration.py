@@ -1,12 +1,8 @@
 """Commands that calibrate the star camera: lens by the stars or a board, mount, delay."""
 
 import csv
-import hashlib
-import json
 import math
-from collections.abc import Sequence
-from dataclasses import replace
-from datetime import UTC, datetime
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -16,35 +12,13 @@ import typer
 from numpy.typing import NDArray
 
 from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
-from calibration.camera.board import Board, calibrate_from_board, find_corners
-from calibration.camera.delay import camera_delay
-from calibration.imu.result import CalibrationResult, Provenance, Quantity
+from calibration.camera.board import Board
 from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import (
-    check_targets,
-    find_frames,
-    read_frame,
-    with_progress,
-    write_atomically,
-)
-from groundstation.cli.star_plots import plot_delay, plot_residuals
+from groundstation.cli.star_files import check_targets, find_frames, read_frame, with_progress
+from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
+from groundstation.sky_calibration.delay import delay_from_headings
+from groundstation.sky_calibration.lens import lens_from_board, lens_from_stars, mount_from_turn
 from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.self_calibration import (
-    SkyCalibration,
-    SkyCalibrationError,
-    calibrate_intrinsics,
-    calibrate_mount,
-)
-
-UNITS = {
-    "fx": "px",
-    "fy": "px",
-    "cx": "px",
-    "cy": "px",
-    **dict.fromkeys(("k1", "k2", "p1", "p2", "k3"), "1"),
-    **dict.fromkeys(("mount_offset_x_m", "mount_offset_y_m", "ceiling_height_above_camera_m"), "m"),
-    **dict.fromkeys(("mount_tilt_x_rad", "mount_tilt_y_rad", "mount_yaw_rad"), "rad"),
-}
 
 Folder = Annotated[Path, typer.Argument(help="With camera.json, ceiling.csv and frames/.")]
 Out = Annotated[Path, typer.Option(help="Result with provenance to write (TOML).")]
@@ -72,11 +46,9 @@ def intrinsics(
     check_targets(out, camera_out, plot)
     camera, catalogue, pictures = _pictures(folder)
     wobble_m = None if wobble_mm is None else 1e-3 * wobble_mm
-    try:
-        found = calibrate_intrinsics(pictures, catalogue, camera, wobble_std_m=wobble_m)
-    except SkyCalibrationError as error:
-        raise UsageError(f"{folder}: {error}.") from error
-    _write(folder, "Camera intrinsics from the star field", found, len(pictures), out, camera_out, plot)
+    with refusing(folder), progress_line() as progress:
+        found = lens_from_stars(pictures, catalogue, camera, wobble_m=wobble_m, progress=progress)
+    write_outcome(folder, found, _files(folder), out, camera_out, plot)
 
 
 def mount(
@@ -97,13 +69,16 @@ def mount(
     check_targets(out, camera_out, plot)
     camera, catalogue, pictures = _pictures(folder)
     heading = None if first_heading_deg is None else math.radians(first_heading_deg)
-    try:
-        found = calibrate_mount(
-            pictures, catalogue, camera, wobble_std_m=1e-3 * wobble_mm, first_heading_rad=heading
+    with refusing(folder), progress_line() as progress:
+        found = mount_from_turn(
+            pictures,
+            catalogue,
+            camera,
+            wobble_m=1e-3 * wobble_mm,
+            first_heading_rad=heading,
+            progress=progress,
         )
-    except SkyCalibrationError as error:
-        raise UsageError(f"{folder}: {error}.") from error
-    _write(folder, "Camera mount by turning in place", found, len(pictures), out, camera_out, plot)
+    write_outcome(folder, found, _files(folder), out, camera_out, plot)
 
 
 def board(
@@ -132,52 +107,11 @@ def board(
         printed = Board(int(columns), int(rows), 1e-3 * square_mm, 1e-3 * marker_mm)
     except ValueError as error:
         raise UsageError(f"{error}.") from error
+    kept = None if camera is None else _camera(camera)
     frames = find_frames(folder)
-    views, size = [], None
-    for path in with_progress(frames, "finding corners"):
-        image = read_frame(path, None)
-        if size is not None and image.shape != size:
-            raise UsageError(f"{path}: is of another size than the pictures before it.")
-        size = image.shape
-        view = find_corners(image, printed)
-        if view is not None:
-            views.append(view)
-    assert size is not None
-    try:
-        lens = calibrate_from_board(views, size[1], size[0])
-    except ValueError as error:
-        raise UsageError(f"{folder}: {error}.") from error
-    values = (lens.fx, lens.fy, lens.cx, lens.cy, *lens.distortion)
-    names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-    quantities = {
-        name: Quantity(value, std, UNITS[name])
-        for name, value, std in zip(names, values, lens.std, strict=True)
-    }
-    rms = float(np.sqrt((lens.residual_px**2).mean()))
-    result = CalibrationResult(
-        "Camera intrinsics from a board",
-        _provenance(folder, frames),
-        quantities,
-        {"reprojection_rms": Quantity(rms, math.nan, "px")},
-        {"pictures": lens.pictures, "width": size[1], "height": size[0]},
-    )
-    write_atomically(out, result.to_toml())
-    if camera_out is not None and camera is not None:
-        kept = _camera(camera)
-        better = replace(
-            kept,
-            width=size[1],
-            height=size[0],
-            fx=lens.fx,
-            fy=lens.fy,
-            cx=lens.cx,
-            cy=lens.cy,
-            distortion=lens.distortion,
-        )
-        write_atomically(camera_out, json.dumps(better.to_mapping(), indent=1) + "\n")
-    if plot is not None:
-        plot_residuals(plot, lens.residual_px, f"Board in {lens.pictures} pictures")
-    print(f"board seen in {lens.pictures} of {len(frames)} pictures, reprojection {rms:.3f} px RMS per axis.")
+    with refusing(folder), progress_line() as progress:
+        found = lens_from_board(_same_size(frames), printed, camera=kept, progress=progress)
+    write_outcome(folder, found, frames, out, camera_out, plot)
 
 
 def delay(
@@ -189,6 +123,7 @@ def delay(
     """Calibrate the camera's delay by laying star headings on the integrated turn rate.
 
     imu.csv needs t_s,omega_rad_s; stars.csv t_arrival_s,heading_rad. The mock-up must turn to and fro.
+    The rig reads the result: delay_file = "delay.toml" in its star_camera section.
 
     Example:
       groundstation star-tracker delay recordings/wiggle --out delay.toml
@@ -196,60 +131,9 @@ def delay(
     check_targets(out, plot)
     gyro = _columns(folder / "imu.csv", ("t_s", "omega_rad_s"))
     stars = _columns(folder / "stars.csv", ("t_arrival_s", "heading_rad"))
-    try:
-        found = camera_delay(gyro[0], gyro[1], stars[0], stars[1], guess_s)
-    except ValueError as error:
-        raise UsageError(f"{folder}: {error}.") from error
-    rms = float(np.sqrt((found.residual_rad**2).mean()))
-    result = CalibrationResult(
-        "Camera delay against the IMU",
-        _provenance(folder, [folder / "imu.csv", folder / "stars.csv"]),
-        {
-            "delay": Quantity(found.delay_s, found.std_s, "s"),
-            "gyro_bias": Quantity(found.gyro_bias_rad_s, math.nan, "rad/s"),
-        },
-        {"heading_rms": Quantity(rms, math.nan, "rad")},
-        {"headings": int(found.used.sum()), "clipped": int((~found.used).sum())},
-    )
-    write_atomically(out, result.to_toml())
-    if plot is not None:
-        plot_delay(plot, stars[0][found.used], found.residual_rad, found.delay_s)
-    print(f"delay {1e3 * found.delay_s:.2f} ms, one sigma {1e3 * found.std_s:.2f} ms.")
-
-
-def _write(
-    folder: Path,
-    title: str,
-    found: SkyCalibration,
-    pictures: int,
-    out: Path,
-    camera_out: Path | None,
-    plot: Path | None,
-) -> None:
-    mapping = found.camera.to_mapping()
-    mapping.update(zip(("k1", "k2", "p1", "p2", "k3"), found.camera.distortion, strict=True))
-    mapping["mount_offset_x_m"], mapping["mount_offset_y_m"], _ = found.camera.mount_offset_body_m
-    quantities = {
-        name: Quantity(float(mapping[name]), std, UNITS[name])
-        for name, std in found.adjusted.std_camera.items()
-    }
-    if "mount_offset_x_m" in quantities:
-        quantities["mount_yaw_rad"] = Quantity(found.camera.mount_yaw_rad, math.nan, "rad")
-    result = CalibrationResult(
-        title,
-        _provenance(folder, [folder / "camera.json", folder / "ceiling.csv", *find_frames(folder)]),
-        quantities,
-        {"reprojection_rms": Quantity(found.adjusted.rms_px, math.nan, "px")},
-        {"pictures": len(found.solved), "sightings": int(found.adjusted.used.sum())},
-    )
-    write_atomically(out, result.to_toml())
-    if camera_out is not None:
-        write_atomically(camera_out, json.dumps(found.camera.to_mapping(), indent=1) + "\n")
-    if plot is not None:
-        plot_residuals(plot, found.adjusted.residual_px[found.adjusted.used], title)
-    print(
-        f"{len(found.solved)} of {pictures} pictures used, residual {found.adjusted.rms_px:.3f} px per axis."
-    )
+    with refusing(folder), progress_line() as progress:
+        found = delay_from_headings(*gyro, *stars, guess_s=guess_s, progress=progress)
+    write_outcome(folder, found, [folder / "imu.csv", folder / "stars.csv"], out, None, plot)
 
 
 def _pictures(folder: Path) -> tuple[CameraCalibration, StarCatalogue, list[Spots]]:
@@ -264,19 +148,26 @@ def _pictures(folder: Path) -> tuple[CameraCalibration, StarCatalogue, list[Spot
     return camera, catalogue, pictures
 
 
+def _files(folder: Path) -> list[Path]:
+    return [folder / "camera.json", folder / "ceiling.csv", *find_frames(folder)]
+
+
+def _same_size(frames: list[Path]) -> Iterator[NDArray[np.uint8]]:
+    """Read pictures one after the other; the first decides their size."""
+    size = None
+    for path in frames:
+        image = read_frame(path, None)
+        if size is not None and image.shape != size:
+            raise UsageError(f"{path}: is of another size than the pictures before it.")
+        size = image.shape
+        yield image
+
+
 def _camera(path: Path) -> CameraCalibration:
     try:
         return CameraCalibration.load(path)
     except CalibrationFileError as error:
         raise UsageError(str(error)) from error
-
-
-def _provenance(folder: Path, files: Sequence[Path]) -> Provenance:
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return Provenance(folder.resolve().name, digest.hexdigest(), datetime.now(UTC))
 
 
 def _columns(path: Path, names: tuple[str, ...]) -> list[NDArray[np.float64]]:

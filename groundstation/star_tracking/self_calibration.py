@@ -58,11 +58,13 @@ class SkyCalibration:
         camera: The camera as found.
         adjusted: The adjustment behind it, with standard deviations and residuals.
         solved: Indices of the pictures that took part.
+        seen: What was adjusted to.
     """
 
     camera: CameraCalibration
     adjusted: Adjusted
     solved: NDArray[np.int64]
+    seen: Observations
 
 
 def calibrate_intrinsics(
@@ -127,7 +129,7 @@ def calibrate_mount(
         return found
     yaw = camera.mount_yaw_rad + float(heading[0]) - first_heading_rad
     turned = _turn_mount(found.camera, float(np.arctan2(np.sin(yaw), np.cos(yaw))))
-    return SkyCalibration(turned, found.adjusted, found.solved)
+    return SkyCalibration(turned, found.adjusted, found.solved, found.seen)
 
 
 def _turn_mount(camera: CameraCalibration, yaw_rad: float) -> CameraCalibration:
@@ -173,7 +175,7 @@ def _calibrate(
         except ValueError as error:
             raise SkyCalibrationError(str(error)) from error
         camera = adjusted.camera
-        result = SkyCalibration(camera, adjusted, np.array([i for i, _ in fixes], dtype=np.int64))
+        result = SkyCalibration(camera, adjusted, np.array([i for i, _ in fixes], dtype=np.int64), seen)
     assert result is not None
     return result
 

@@ -67,6 +67,7 @@ class SurveyedSky:
         anchors: Names of the anchors that lie in the part that was surveyed.
         tape_residual_m: These anchors by tape minus as surveyed, shape (a, 2).
         adjusted: The adjustment behind it.
+        seen: What it was adjusted to.
     """
 
     ids: tuple[str, ...]
@@ -81,6 +82,7 @@ class SurveyedSky:
     anchors: tuple[str, ...]
     tape_residual_m: Array
     adjusted: Adjusted
+    seen: Observations
 
 
 def survey(
@@ -172,6 +174,7 @@ def _survey_once(
         anchors=tuple(anchor.name for anchor in anchors),
         tape_residual_m=tape - adjusted.star_m[named],
         adjusted=adjusted,
+        seen=seen,
     )
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import tomllib
 
 import cv2
 import numpy as np
@@ -125,6 +126,12 @@ def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(ceiling_folder, tmp
     )
     assert "verification" in result.stdout
     assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
+    assert result.stderr == ""
+    provenance = tomllib.loads((tmp_path / "ceiling.toml").read_text())
+    assert provenance["pictures_held_out"] == provenance["pictures_verified"] == 2
+    assert 0.0 < provenance["residual"]["verification_rms"]["value"] < 3e-4
+    assert provenance["ceiling_height_above_camera_m"]["std"] > 0.0
+    assert len(provenance["recording_sha256"]) == 64
     header = (tmp_path / "ceiling.csv").read_text().splitlines()[0]
     assert header == "id,x_m,y_m,std_x_m,std_y_m,times_seen"
     (tmp_path / "camera.json").write_text((tmp_path / "found.json").read_text())
