@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.rows import Row
+from groundstation.core.library import default_core
 
 HEAD = ("what", "limit", "measured", "ok")
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
@@ -37,10 +38,11 @@ def markdown(rows: Sequence[Row]) -> str:
 
 
 def machine() -> str:
-    """Date and machine, as they stand before a subject's options."""
+    """Date, machine and core, as they stand before a subject's options."""
     return (
         f"{time.strftime('%Y-%m-%d')}, {_processor()}, {os.cpu_count()} cores, {platform.system()} "
-        f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}"
+        f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}, "
+        f"{default_core().name}"
     )
 
 
