@@ -51,4 +51,4 @@ bench: $(CORE) $(PEERS)
 	@$(BIN)/python tools/bench.py
 
 clean:
-	@rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	@rm -rf groundstation/core/_core.so .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

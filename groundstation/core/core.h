@@ -16,9 +16,9 @@
 #endif
 
 /* Put before loops over integers or independent elements: compiled for AVX2 too and chosen when the library is loaded.
- * Sanitizers cannot run the choosing function that early. */
+ * Sanitizers cannot run the choosing function that early; GS_NO_CLONES is for the test that both give the same bits. */
 #if defined(__x86_64__) && defined(__linux__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(GS_NO_CLONES)
 #define GS_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define GS_CLONES

@@ -19,6 +19,10 @@ class CoreError(RuntimeError):
     """A library that cannot be used; the text says why and what to do."""
 
 
+class CoreMissingError(CoreError):
+    """Nothing was compiled: there was no C compiler."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Core:
     """Which code does the work.
@@ -60,10 +64,11 @@ def load_core(library: Path = LIBRARY) -> Core:
     """Load a compiled library.
 
     Raises:
-        CoreError: It is not there, cannot be loaded, or was made of other sources than those beside it.
+        CoreMissingError: It is not there.
+        CoreError: It cannot be loaded, or was made of other sources than those beside it.
     """
     if not library.exists():
-        raise CoreError(f"there is no {library.name}: the core was not compiled (make compiles it)")
+        raise CoreMissingError(f"there is no {library.name}: the core was not compiled (make compiles it)")
     try:
         loaded = ctypes.CDLL(str(library))
         said_by = loaded["gs_sources"]
@@ -83,6 +88,8 @@ def default_core() -> Core:
     """The compiled core where there is one, else NumPy; asked once per process."""
     try:
         return load_core()
+    except CoreMissingError as error:  # the installation has said so
+        logging.getLogger(__name__).info("%s; using the slower NumPy code", error)
     except CoreError as error:
         logging.getLogger(__name__).warning("%s; using the slower NumPy code", error)
-        return PURE
+    return PURE

@@ -198,7 +198,7 @@ def _gather(
     settings: DetectorSettings,
 ) -> SpotPixels:
     """Collect the pixels of every label, sorted by label."""
-    where = np.flatnonzero(labels.ravel())
+    where = np.flatnonzero(labels.ravel() != 0)
     label = labels.ravel()[where]
     order = np.argsort(label, kind="stable")  # radix sort: linear for 16-bit keys
     where = where[order]

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.core.library import PURE
+from groundstation.core.build import compile_core
+from groundstation.core.library import PURE, load_core
 from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError, detect
 
 ROUNDING_PX = 1e-7  # sums of another order, the exponential's last bits; both fits end after two steps
@@ -182,3 +183,14 @@ def test_both_refuse_what_is_no_picture(both, image):
     for detector in both:
         with pytest.raises(PictureError, match="expected"):
             detector.find(image)
+
+
+@pytest.mark.slow
+def test_wider_vectors_give_the_same_bits(compiled_core, painter, tmp_path):
+    plain = load_core(compile_core(tmp_path / "plain.so", ("-DGS_NO_CLONES",)))
+    for velocity in ((0.0, 0.0, 0.0), (0.6, 0.2, 1.5)):
+        image = painter.paint(np.random.default_rng(9), (2.5, 2.0, 0.4), velocity, exposure_s=0.04)
+        one, two = Detector(core=compiled_core).find(image), Detector(core=plain).find(image)
+        assert len(one) > 10
+        for name in ("u_px", "v_px", "flux_dn", "cov_px2", "elongation", "streak_px"):
+            assert np.array_equal(getattr(one, name), getattr(two, name)), name
