@@ -24,15 +24,15 @@ from groundstation.cli.fusion_folder import write_atomically
 from groundstation.fusion import error_state as es
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.messages.cdr import CodecError
-from groundstation.messages.definitions import Imu, StarFix, ValveStatus
+from groundstation.messages.definitions import Imu, OverheadFix, StarFix, ValveStatus
 from groundstation.nodes.fusion import Fusion
 from groundstation.runtime.asking import ask
 from groundstation.runtime.errors import GroundStationError
-from groundstation.runtime.estimation import fix_floor_of, rig_noise
+from groundstation.runtime.estimation import fused_floors_of, rig_noise
 from groundstation.runtime.rig import load_rig
 from groundstation.runtime.running import find_running
 
-HEARD = {topic_of(kind).noun: topic_of(kind) for kind in (Imu, StarFix, ValveStatus)}
+HEARD = {topic_of(kind).noun: topic_of(kind) for kind in (Imu, StarFix, OverheadFix, ValveStatus)}
 ADVICE_EVERY_S = 1.0
 SILENCE_S = 10.0
 GO_TO_EVERY_S = 9.0
@@ -69,7 +69,7 @@ def imu(
             f"no run with a vehicle {name!r} is going on: start it with `groundstation run {rig}`."
         )
     smoother = OfflineSmoother(widened(rig_noise(known_rig, name)))
-    watch = _Watch(Fusion(name, smoother, "filter", fix_floor_of(known_rig, name)), smoother)
+    watch = _Watch(Fusion(name, smoother, "filter", fused_floors_of(known_rig, name)), smoother)
     sequence = GuidedSequence()
     try:
         with ZenohBus(run.endpoint) as bus:

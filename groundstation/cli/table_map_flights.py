@@ -24,7 +24,7 @@ from groundstation.nodes.fusion import Fusion
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.runtime.errors import RigError
-from groundstation.runtime.estimation import fix_floor_of, rig_noise
+from groundstation.runtime.estimation import fused_floors_of, rig_noise
 from groundstation.runtime.rig import load_rig, parse_rig
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ REFERENCE_C = 25.0
 CLOCK_SMOOTHING_S = 10.0
 """Ticks are laid on the stamps by a mean over this time: quartz drifts slowly, stamps jitter."""
 WILD_SIGMAS = 8.0
-HEARD = tuple(topic_of(kind) for kind in (m.Imu, m.StarFix, m.ValveStatus, m.Request))
+HEARD = tuple(topic_of(kind) for kind in (m.Imu, m.StarFix, m.OverheadFix, m.ValveStatus, m.Request))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def _read_recording(path: Path, recording: Recording, rig_path: Path | None, veh
     logs = []
     for name in rig.vehicles if vehicle is None else (vehicle,):
         tap = _Tap(rig_noise(rig, name))
-        node = Fusion(name, tap, "filter", fix_floor_of(rig, name))
+        node = Fusion(name, tap, "filter", fused_floors_of(rig, name))
         for message in recording.messages(HEARD, (name,)):
             for _ in node.receive(message.payload, message.log_ns):
                 pass

@@ -7,6 +7,7 @@ packets, correction there, then the packets since the exposure are integrated ag
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from dataclasses import replace
@@ -25,6 +26,7 @@ from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
+from groundstation.fusion.past_fixes import Past, PastFixes
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace
 from groundstation.fusion.valve_knocks import add_knocks
@@ -75,6 +77,7 @@ class ErrorStateFilter:
         self._reckoner = make_reckoner(noise, self.counters, table_map, core or default_core())
         self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
         self._candidates: list[Fix] = []
+        self._past = PastFixes()
         self._rests: list[tuple[float, float]] = []
         self._refused: list[tuple[float, Array]] = []
         self._creep = CreepWatch()
@@ -185,11 +188,42 @@ class ErrorStateFilter:
         if t > reckoner.newest_s + 1e-9:
             if t > reckoner.newest_s + MAX_AHEAD_S:
                 return self._refuse(fix, "more than a second ahead of the packets")
-            return FixAccount(fix.t_exposure_ns, False, WAITS, math.nan, math.nan, math.nan, math.nan)
+            return _account(fix, WAITS)
+        self._past.meet(fix.source)
         if not reckoner.has_pose:
             return self._consider(fix, t)
         if t <= reckoner.checkpoint_s:
+            return self._insert(fix, t)
+        return self._correct(fix, t)
+
+    def _insert(self, fix: Fix, t: float) -> FixAccount:
+        """Take a fix whose exposure lies before some that were used: go back, take it, take those again."""
+        split = self._past.before_and_after(fix, t)
+        if split is None or self._trace is not None or self._reckoner.is_lost:
             return self._refuse(fix, "older than the last used")
+        before, after = split
+        self._go_back(before)
+        account = self._correct(fix, t, is_late=True)
+        if account.used and not all(self._correct(p.fix, p.t_s, is_late=True).used for p in after):
+            account = account._replace(used=False, reason="contradicts fixes after it")
+            self.counters.add("fix_contradicts_fixes_after_it")
+        if not account.used:
+            self._go_back([*before, *after])
+            return account
+        self._integrate_to_now()
+        return account
+
+    def _go_back(self, pasts: list[Past]) -> None:
+        """Be as after the last of these."""
+        last = pasts[-1]
+        self._past.replace(pasts)
+        self.x, self.P, self._surface = last.x, last.P, last.surface
+        self._creep = copy.copy(last.creep)
+        self._reckoner.checkpoint_s = last.t_s
+
+    def _correct(self, fix: Fix, t: float, *, is_late: bool = False) -> FixAccount:
+        """Carry the checkpoint to the exposure and correct there, unless the fix lies outside the gate."""
+        reckoner = self._reckoner
         steps: list[Step] = []
         surface, x, P = self._propagate(reckoner.checkpoint_s, t, steps)
         omega_read = self._reckoner.history.omega_at(t)
@@ -200,6 +234,9 @@ class ErrorStateFilter:
         weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
         nis = float(z @ weight @ z)
         if nis > self.noise.gate_nis:
+            if is_late:
+                self.counters.add("fix_outside_the_gate")
+                return _account(fix, "outside the gate", z, nis)
             return self._contradicted(fix, t, z, nis)
         creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - reckoner.checkpoint_s)
         K = PH @ weight
@@ -209,12 +246,12 @@ class ErrorStateFilter:
         reckoner.is_lost = False
         if self._trace is not None:
             self._trace.chains[-1].steps += [*steps, Corrected(H, K, weight, z)]
-        self._accept(t, x, P, surface)
-        return FixAccount(fix.t_exposure_ns, True, "used", float(z[0]), float(z[1]), float(z[2]), nis)
+        self._accept(fix, t, x, P, surface, is_late=is_late)
+        return _account(fix, "used", z, nis, used=True)
 
     def _refuse(self, fix: Fix, reason: str) -> FixAccount:
         self.counters.add("fix_" + reason.replace(" ", "_"))
-        return FixAccount(fix.t_exposure_ns, False, reason, math.nan, math.nan, math.nan, math.nan)
+        return _account(fix, reason)
 
     def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
         """Refuse a fix, or believe it when those before it said the same."""
@@ -224,30 +261,25 @@ class ErrorStateFilter:
             self._reckoner.is_lost = True
             if innovations_agree(self._refused[-self.noise.reopen_after :], self.noise):
                 return self._restart(fix, t, z, nis)
-        return FixAccount(
-            fix.t_exposure_ns, False, "outside the gate", float(z[0]), float(z[1]), float(z[2]), nis
-        )
+        return _account(fix, "outside the gate", z, nis)
 
     def _consider(self, fix: Fix, t: float) -> FixAccount:
         """Start from the first two fixes that agree; one alone may be wrong."""
-        nan = math.nan
         for first in reversed(self._candidates):
             if self._agree(first, fix):
                 self._start(first)
                 for other in self._candidates:
                     used = other is first
                     reason = "starts the estimate" if used else "no second fix agreed"
-                    self._accounts.append(FixAccount(other.t_exposure_ns, used, reason, nan, nan, nan, nan))
+                    self._accounts.append(_account(other, reason, used=used))
                 self._candidates.clear()
                 return self._judge(fix)
         limit_ns = fix.t_exposure_ns - int(CANDIDATE_AGE_S * 1e9)
         for old in [c for c in self._candidates if c.t_exposure_ns < limit_ns]:
-            self._accounts.append(
-                FixAccount(old.t_exposure_ns, False, "no second fix agreed", nan, nan, nan, nan)
-            )
+            self._accounts.append(_account(old, "no second fix agreed"))
             self._candidates.remove(old)
         self._candidates.append(fix)
-        return FixAccount(fix.t_exposure_ns, False, CANDIDATE, nan, nan, nan, nan)
+        return _account(fix, CANDIDATE)
 
     def _agree(self, first: Fix, second: Fix) -> bool:
         """Whether one vehicle may have been seen at both poses."""
@@ -275,7 +307,7 @@ class ErrorStateFilter:
             self._learn(x, P, self._reckoner.history.between(rest[0], t))
         self._reckoner.has_pose = True
         self._begin_chain(t, x, P)
-        self._accept(t, x, P, surface)
+        self._accept(fix, t, x, P, surface)
         self.counters.add("fix_starts_the_estimate")
 
     def _restart(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
@@ -285,12 +317,10 @@ class ErrorStateFilter:
         measurements.take_pose(fix, x, P, float(x[es.THETA]), REOPENED_VELOCITY_M_S)
         surface, x, P = self._first_look(x, P)
         self._begin_chain(t, x, P)
-        self._accept(t, x, P, surface)
+        self._accept(fix, t, x, P, surface)
         self._creep.forget()
         self.counters.add("fix_starts_the_estimate_again")
-        return FixAccount(
-            fix.t_exposure_ns, True, "starts the estimate again", float(z[0]), float(z[1]), float(z[2]), nis
-        )
+        return _account(fix, "starts the estimate again", z, nis, used=True)
 
     def _first_look(self, x: Array, P: Array) -> tuple[LearnedSurface, Array, Array]:
         surface, x, P, _ = look(
@@ -299,20 +329,26 @@ class ErrorStateFilter:
         return surface, x, P
 
     def _begin_chain(self, t: float, x: Array, P: Array) -> None:
+        self._past.forget()
         if self._trace is not None:
             self._trace.chains.append(
                 Chain(t, x[: es.SIZE].copy(), P[: es.SIZE].copy(), self._rest_of(t) is not None)
             )
 
-    def _accept(self, t: float, x: Array, P: Array, surface: LearnedSurface) -> None:
-        """Make the corrected state at `t` the checkpoint and integrate from it to now."""
+    def _accept(
+        self, fix: Fix, t: float, x: Array, P: Array, surface: LearnedSurface, *, is_late: bool = False
+    ) -> None:
+        """Make the corrected state at `t` the checkpoint and, unless later fixes follow, integrate to now."""
         self.x, self.P, self._surface = x, 0.5 * (P + P.T), surface
         self._reckoner.checkpoint_s = t
+        oldest = self._past.note(Past(t, fix, self.x, self.P, surface, copy.copy(self._creep)))
+        if is_late:
+            return
         self._refused.clear()
-        self._rests = [r for r in self._rests if r[1] > t]
-        self._doubt.forget_before(t)
+        self._rests = [r for r in self._rests if r[1] > oldest]
+        self._doubt.forget_before(oldest)
         if self._trace is None:
-            self._reckoner.history.forget_before(t)
+            self._reckoner.history.forget_before(oldest)
         self._integrate_to_now()
 
     def _propagate(
@@ -385,14 +421,17 @@ class ErrorStateFilter:
         if not self._reckoner.has_pose:
             return
         x, here = self.x.copy(), slice(es.WAVE_X, es.WAVE_Y + 1)
-        for a, b, resting in self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s):
+        stretches = self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        is_short = len(stretches) == 1  # then one look, in its middle and that of the second to come, will do
+        for a, b, resting in stretches:
             segment = self._reckoner.history.between(a, b)
             if resting:
                 x[es.VX : es.VY + 1] = 0.0
             elif len(segment.span_s):
-                x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a)))
+                x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a + is_short * LOOK_S)))
                 x[: es.MOVING] = fly(x, segment, self._lag_difference_s, self._map).moved
-        x[here] = self._surface.slope(x, _ahead(x, 0.5 * LOOK_S))
+        if not is_short:
+            x[here] = self._surface.slope(x, _ahead(x, 0.5 * LOOK_S))
         self._looked_s = self._reckoner.newest_s
         self._reckoner.load(x[: es.SIZE], x[: es.MOVING])
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
@@ -405,3 +444,10 @@ class ErrorStateFilter:
 def _ahead(x: Array, time_s: float) -> Array:
     """Return the place (2,) where the vehicle will be."""
     return np.asarray(x[es.PX : es.PY + 1] + time_s * x[es.VX : es.VY + 1])
+
+
+def _account(
+    fix: Fix, reason: str, z: Array | None = None, nis: float = math.nan, *, used: bool = False
+) -> FixAccount:
+    x, y, heading = (math.nan,) * 3 if z is None else map(float, z)
+    return FixAccount(fix.t_exposure_ns, used, reason, x, y, heading, nis, fix.source)

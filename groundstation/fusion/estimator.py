@@ -33,7 +33,7 @@ class ImuPacket(NamedTuple):
 
 
 class Fix(NamedTuple):
-    """Pose of the body's origin from one star image."""
+    """Pose of the body's origin from one image."""
 
     t_exposure_ns: int
     """Middle of the exposure."""
@@ -43,6 +43,8 @@ class Fix(NamedTuple):
     heading_rad: float
     cov: Array
     """(3, 3) of x, y, heading; m^2, m rad, rad^2."""
+    source: str = "stars"
+    """Who made it; the exposures of one source never go back."""
 
 
 class PlanarState(NamedTuple):
@@ -78,6 +80,8 @@ class FixAccount(NamedTuple):
     innovation_heading_rad: float
     nis: float
     """Normalised innovation squared, 3 degrees of freedom."""
+    source: str = "stars"
+    """Of the fix."""
 
 
 class Counters:

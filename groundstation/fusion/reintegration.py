@@ -222,7 +222,7 @@ class ReintegrationEstimator:
         if reason != "used":
             self.counters.add("fix_" + reason.replace(" ", "_"))
         nan = math.nan
-        return FixAccount(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan)
+        return FixAccount(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan, fix.source)
 
     def _lever(self, theta: float) -> tuple[float, float]:
         c, s = math.cos(theta), math.sin(theta)

@@ -30,6 +30,7 @@ from groundstation.messages.operation import (
     SequencePhase,
     VehicleMode,
 )
+from groundstation.messages.overhead import FixComparison, OverheadFix, OverheadImage
 from groundstation.messages.stars import (
     FixBytes,
     SkyChange,
@@ -50,6 +51,7 @@ __all__ = [
     "Diagnostics",
     "FixAccount",
     "FixBytes",
+    "FixComparison",
     "FusionCalibration",
     "FusionStatus",
     "Imu",
@@ -58,6 +60,8 @@ __all__ = [
     "ImuRaw",
     "Journal",
     "Latency",
+    "OverheadFix",
+    "OverheadImage",
     "ReferenceBytes",
     "ReferenceState",
     "Request",

@@ -44,9 +44,10 @@ class VehicleState(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixAccount(Message):
-    """What fusion did with one fix; the stamp is the fix's exposure."""
+    """What fusion did with one fix of ``stars`` or ``overhead``; the stamp is the fix's exposure."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixAccount"
+    source: Text
     used: Bool
     reason: Text
     innovation: Float64x3

@@ -17,6 +17,7 @@ from groundstation.messages.definitions import (
     FusionCalibration,
     FusionStatus,
     Imu,
+    OverheadFix,
     Request,
     StarFix,
     ValveCommand,
@@ -30,6 +31,8 @@ from groundstation.nodes.node import Node
 STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
 DIAGNOSTICS_EVERY = 5
+SOURCES: Mapping[type[Message], str] = MappingProxyType({StarFix: "stars", OverheadFix: "overhead"})
+"""Messages that bring fixes, and the rig's word for who says them."""
 NO_FILES: Mapping[str, tuple[str, str]] = MappingProxyType({})
 
 
@@ -40,12 +43,13 @@ class Fusion(Node):
         vehicle: Its name.
         estimator: A fresh one.
         method: Its row in the table of estimators.
-        floor_std: What calibration leaves in every fix, beyond its own covariance: x, y (m), heading (rad).
+        floors: What calibration leaves in every fix, beyond its own covariance, for each source whose fixes
+            are taken (``stars``, ``overhead``): x, y (m), heading (rad).
         calibration: The files that the estimator was made from, by name: hash and text.
         stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
-    inputs = (Imu, StarFix, ValveStatus, ValveCommand, Request)
+    inputs = (Imu, StarFix, OverheadFix, ValveStatus, ValveCommand, Request)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
@@ -53,7 +57,7 @@ class Fusion(Node):
         vehicle: str,
         estimator: Estimator,
         method: str,
-        floor_std: tuple[float, float],
+        floors: Mapping[str, tuple[float, float]],
         calibration: Mapping[str, tuple[str, str]] = NO_FILES,
         stand_in: ForceStandIn | None = None,
     ) -> None:
@@ -62,7 +66,10 @@ class Fusion(Node):
         self._method = method
         self._calibration = calibration
         self._stand_in = stand_in
-        self._floor = np.diag([floor_std[0] ** 2, floor_std[0] ** 2, floor_std[1] ** 2])
+        self._floors = {
+            source: np.diag([xy_m**2, xy_m**2, heading_rad**2])
+            for source, (xy_m, heading_rad) in floors.items()
+        }
         self._skipped_ms = 0
         self._rest_since_ns: int | None = None
         self._rest_ns = 0
@@ -70,6 +77,10 @@ class Fusion(Node):
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
+
+    def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
+        source = SOURCES.get(payload)
+        return () if source is not None and source not in self._floors else (self.vehicle,)
 
     def start(self, now_ns: int) -> Iterator[Message]:
         if self._calibration:
@@ -80,8 +91,8 @@ class Fusion(Node):
         match message:
             case Imu():
                 yield from self._propagate(message)
-            case StarFix(fix=True):
-                yield from self._correct(message, now_ns)
+            case StarFix(fix=True) | OverheadFix(fix=True) if SOURCES[type(message)] in self._floors:
+                yield from self._correct(message, SOURCES[type(message)], now_ns)
             case ValveStatus():
                 if message.floating or now_ns - self._float_ordered_ns >= ORDER_HOLDS_NS:
                     self._hear_float(now_ns, floating=message.floating)
@@ -138,13 +149,13 @@ class Fusion(Node):
             self._state = state
             yield self._say(state)
 
-    def _correct(self, fix: StarFix, now_ns: int) -> Iterator[Message]:
-        covariance = np.array(fix.covariance).reshape(3, 3) + self._floor
+    def _correct(self, fix: StarFix | OverheadFix, source: str, now_ns: int) -> Iterator[Message]:
+        covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
             motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.omega_rad_s])
             covariance += fix.stamp_sigma_s**2 * np.outer(motion, motion)
         account = self._estimator.add_fix(
-            Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance)
+            Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
         )
         if account.reason != WAITS:  # it is accounted for when the packets up to its exposure are here
             yield self._account(account, now_ns)
@@ -161,7 +172,14 @@ class Fusion(Node):
         )
         age_s = (now_ns - account.t_exposure_ns) * 1e-9
         return FixAccount(
-            account.t_exposure_ns, self.vehicle, account.used, account.reason, innovation, account.nis, age_s
+            account.t_exposure_ns,
+            self.vehicle,
+            account.source,
+            account.used,
+            account.reason,
+            innovation,
+            account.nis,
+            age_s,
         )
 
     def _say(self, state: PlanarState) -> VehicleState:

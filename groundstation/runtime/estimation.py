@@ -84,6 +84,22 @@ def fix_floor_of(rig: Rig, vehicle: str) -> tuple[float, float]:
     return camera.sigma_xy_m, camera.sigma_heading_rad
 
 
+def fix_floors_of(rig: Rig, vehicle: str) -> dict[str, tuple[float, float]]:
+    """Return what calibration leaves in every fix, m and rad, for each source that the vehicle has."""
+    floors = {}
+    if rig.vehicles[vehicle].has_stars:
+        floors["stars"] = fix_floor_of(rig, vehicle)
+    if rig.overhead_camera is not None:
+        floors["overhead"] = rig.overhead_camera.sigma_xy_m, rig.overhead_camera.sigma_heading_rad
+    return floors
+
+
+def fused_floors_of(rig: Rig, vehicle: str) -> dict[str, tuple[float, float]]:
+    """Return the same for the sources whose fixes the vehicle's estimator takes."""
+    floors = fix_floors_of(rig, vehicle)
+    return {source: floors[source] for source in rig.vehicles[vehicle].fused}
+
+
 def slope_grid_of(rig: Rig) -> SlopeGrid | None:
     """Return the rig's table map for filter and controller, None if it names none.
 

@@ -20,6 +20,7 @@ from groundstation.nodes.allocation import Allocation
 from groundstation.nodes.command_mux import CommandMux
 from groundstation.nodes.controller import Controller
 from groundstation.nodes.fix_reader import FixReader
+from groundstation.nodes.fix_referee import FixReferee
 from groundstation.nodes.force_stand_in import ForceStandIn
 from groundstation.nodes.fusion import Fusion
 from groundstation.nodes.guard import Guard
@@ -28,7 +29,13 @@ from groundstation.nodes.node import Node
 from groundstation.nodes.reference_reader import ReferenceReader
 from groundstation.nodes.start_sequence import StartSequence
 from groundstation.nodes.valve_writer import ValveWriter
-from groundstation.runtime.estimation import calibration_texts, fix_floor_of, noise_of, slope_grid_of
+from groundstation.runtime.estimation import (
+    calibration_texts,
+    fix_floors_of,
+    fused_floors_of,
+    noise_of,
+    slope_grid_of,
+)
 from groundstation.runtime.rig import MOCK_UP_RADIUS_M, MockUpSection, Rig
 
 
@@ -118,6 +125,22 @@ def star_tracker(rig: Rig, vehicle: str) -> Node:
     return StarTracker(vehicle, camera.camera, camera.ceiling, camera.delay_sigma_s, settings)
 
 
+def overhead_tracker(rig: Rig, vehicle: str) -> Node:
+    """All mock-ups in the picture from above."""
+    from groundstation.nodes.overhead_tracker import OverheadTracker  # OpenCV loads only where it is used
+
+    del vehicle
+    camera = rig.overhead_camera
+    assert camera is not None
+    return OverheadTracker(tuple(rig.vehicles), camera.camera, camera.circles, camera.delay_sigma_s)
+
+
+def fix_referee(rig: Rig, vehicle: str) -> Node:
+    """Star fixes against overhead fixes."""
+    floors = fix_floors_of(rig, vehicle)
+    return FixReferee(vehicle, floors["stars"], floors["overhead"])
+
+
 def fusion(rig: Rig, vehicle: str) -> Node:
     """The rig's estimator with its noise model and what calibration files say."""
     method = rig.mock_up_of(vehicle).fusion.method
@@ -126,8 +149,8 @@ def fusion(rig: Rig, vehicle: str) -> Node:
     mock_up = rig.mock_up_of(vehicle)
     push = ValvePush(_model(mock_up), mock_up.valves.open_delay_s, mock_up.valves.close_delay_s)
     stand_in = ForceStandIn(estimator, push, mock_up.mass_kg, mock_up.inertia_kg_m2)
-    floor, files = fix_floor_of(rig, vehicle), calibration_texts(rig, vehicle)
-    return Fusion(vehicle, estimator, method, floor, files, stand_in)
+    floors, files = fused_floors_of(rig, vehicle), calibration_texts(rig, vehicle)
+    return Fusion(vehicle, estimator, method, floors, files, stand_in)
 
 
 def controller(rig: Rig, vehicle: str) -> Node:

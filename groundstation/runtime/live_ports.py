@@ -17,6 +17,7 @@ from groundstation.messages.base import Message
 from groundstation.runtime.ports import (
     FixStreamPort,
     ImuPort,
+    OverheadCameraPort,
     PortTranslation,
     ReferencePort,
     StarCameraPort,
@@ -73,13 +74,13 @@ class _ByteEdge(Edge):
 
 
 class _CameraEdge(Edge):
-    def __init__(self, source: str, timeout_s: float) -> None:
+    def __init__(self, source: str, timeout_s: float, *, is_colour: bool = False) -> None:
         address = int(source) if source.isdigit() else source  # a device index
-        self._camera = StarCamera.open(address, silence_s=timeout_s)
+        self._camera = StarCamera.open(address, silence_s=timeout_s, is_colour=is_colour)
 
     def read(self) -> Iterable[tuple[int, object]]:
         frame = self._camera.read(READ_TIMEOUT_S)
-        return () if frame is None else ((frame.stamp_arrival_ns, frame),)
+        return () if frame is None else ((frame.stamp_ns, frame),)
 
     def close(self) -> None:
         self._camera.close()
@@ -108,6 +109,9 @@ OPENERS: dict[type[PortTranslation], Callable[[PortTranslation], Edge]] = {
     FixStreamPort: lambda port: _ByteEdge(str(port.address), STREAM_BAUD),
     ReferencePort: lambda port: _ByteEdge(str(port.address), STREAM_BAUD),
     StarCameraPort: lambda port: _CameraEdge(str(port.address), cast("StarCameraPort", port).timeout_s),
+    OverheadCameraPort: lambda port: _CameraEdge(
+        str(port.address), cast("OverheadCameraPort", port).timeout_s, is_colour=True
+    ),
     ValveBusPort: lambda port: _CanEdge(cast("Mapping[str, object]", port.address)),
 }
 

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from calibration.camera.liveries import load_liveries
 from calibration.camera.models import CameraCalibration
+from calibration.camera.overhead_camera import OverheadCamera
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.bus.journal import JournalWriter
 from groundstation.nodes.node import Node
@@ -38,6 +40,7 @@ class NodeRow:
         weight: What it may share a process with.
         make: Builds it from the rig for a vehicle.
         condition: Whether a vehicle has it.
+        is_of_rig: One for the whole rig instead of one per vehicle; its vehicle is empty.
     """
 
     name: str
@@ -45,9 +48,12 @@ class NodeRow:
     weight: Weight
     make: Callable[[Rig, str], Node]
     condition: Callable[[Rig, str], bool] = lambda _rig, _vehicle: True
+    is_of_rig: bool = False
 
     def vehicles(self, rig: Rig) -> list[str]:
-        """Vehicles that have this node."""
+        """Vehicles that have this node; one empty name for a node of the rig."""
+        if self.is_of_rig:
+            return [""] if self.condition(rig, "") else []
         return [name for name in rig.vehicles if self.condition(rig, name)]
 
 
@@ -61,6 +67,14 @@ def _has_fix_stream(rig: Rig, vehicle: str) -> bool:
 
 def _has_reference(rig: Rig, vehicle: str) -> bool:
     return rig.vehicles[vehicle].reference is not None
+
+
+def _has_overhead_camera(rig: Rig, _vehicle: str) -> bool:
+    return rig.overhead_camera is not None
+
+
+def _has_two_sources(rig: Rig, vehicle: str) -> bool:
+    return rig.overhead_camera is not None and rig.vehicles[vehicle].has_stars
 
 
 def _starts_by_itself(rig: Rig, vehicle: str) -> bool:
@@ -78,9 +92,18 @@ NODES: tuple[NodeRow, ...] = (
     NodeRow("spot_finder", _SKY, Weight.HEAVY, factories.spot_finder, _has_camera),
     NodeRow("star_tracker", _SKY, Weight.HEAVY, factories.star_tracker, _has_camera),
     NodeRow("picture_keeper", _SKY, Weight.HEAVY, factories.picture_keeper, _has_camera),
+    NodeRow(
+        "overhead_tracker",
+        "overhead",
+        Weight.HEAVY,
+        factories.overhead_tracker,
+        _has_overhead_camera,
+        is_of_rig=True,
+    ),
     NodeRow("fusion", _FLIGHT, Weight.URGENT, factories.fusion),
     NodeRow("controller", _FLIGHT, Weight.LIGHT, factories.controller),
     NodeRow("allocation", _FLIGHT, Weight.LIGHT, factories.allocation),
+    NodeRow("fix_referee", _STATION, Weight.LIGHT, factories.fix_referee, _has_two_sources),
     NodeRow("start_sequence", _STATION, Weight.LIGHT, factories.start_sequence, _starts_by_itself),
     NodeRow("reference_reader", _STATION, Weight.LIGHT, factories.reference_reader, _has_reference),
 )
@@ -88,8 +111,8 @@ _BY_NAME = {row.name: row for row in NODES}
 
 
 def key_of(row: NodeRow, vehicle: str) -> str:
-    """Key of a node in journals: ``vehicle/name``."""
-    return f"{vehicle}/{row.name}"
+    """Key of a node in journals: ``vehicle/name``, or ``name`` for a node of the rig."""
+    return f"{vehicle}/{row.name}" if vehicle else row.name
 
 
 def process_of(rig: Rig, row: NodeRow, vehicle: str) -> str:
@@ -112,6 +135,7 @@ def check_rig(rig: Rig) -> None:
         if mock_up.star_camera is not None:
             CameraCalibration.load(mock_up.star_camera.camera)
             StarCatalogue.load(mock_up.star_camera.ceiling)
+    _check_overhead(rig)
     unknown = set(rig.nodes) - set(_BY_NAME)
     if unknown:
         raise RigError(f"nodes.{unknown.pop()}: no such node (there are {', '.join(_BY_NAME)})")
@@ -125,6 +149,19 @@ def check_rig(rig: Rig) -> None:
             heavy, urgent = weights[Weight.HEAVY], weights[Weight.URGENT]
             raise RigError(
                 f"process '{process}' holds {heavy}, which is heavy, beside {urgent}, which must not wait"
+            )
+
+
+def _check_overhead(rig: Rig) -> None:
+    if rig.overhead_camera is None:
+        return
+    OverheadCamera.load(rig.overhead_camera.camera)
+    dressed = {livery.vehicle for livery in load_liveries(rig.overhead_camera.circles)}
+    for vehicle in rig.vehicles:
+        if vehicle not in dressed:
+            raise RigError(
+                f"overhead_camera.circles: {rig.overhead_camera.circles} has no table [{vehicle}] for the "
+                "vehicle of that name"
             )
 
 

@@ -93,6 +93,26 @@ class StarCameraPort(PortTranslation):
 
 
 @dataclass(frozen=True)
+class OverheadCameraPort(PortTranslation):
+    """The camera over the table: colour frames, stamped in the middle of their exposure."""
+
+    reads = m.OverheadImage
+
+    delay: ExposureDelay
+    timeout_s: float
+
+    @property
+    def delivery(self) -> Delivery:
+        return Delivery.NEWEST
+
+    def to_message(self, stamp_ns: int, data: object) -> Message:
+        assert isinstance(data, CameraFrame)
+        height, width, _ = data.image.shape
+        exposure_ns = self.delay.middle_ns(stamp_ns)
+        return m.OverheadImage(exposure_ns, "", height, width, "bgr8", 0, 3 * width, data.image.tobytes())
+
+
+@dataclass(frozen=True)
 class FixStreamPort(PortTranslation):
     """An external pose stream whose poses serve as fixes."""
 
@@ -139,6 +159,12 @@ def ports_of(rig: Rig) -> list[PortTranslation]:
     ports: list[PortTranslation] = [
         ValveBusPort("valve_bus", "", rig.valve_bus, "commands", tuple(rig.vehicles))
     ]
+    overhead = rig.overhead_camera
+    if overhead is not None:
+        delay = ExposureDelay(overhead.delay_s, overhead.delay_sigma_s)
+        ports.append(
+            OverheadCameraPort("overhead_camera", "", overhead.address, "overhead", delay, overhead.timeout_s)
+        )
     for name, vehicle in rig.vehicles.items():
         mock_up = rig.mock_up_of(name)
         ports.append(ImuPort(f"{name}/imu", name, vehicle.imu, f"{name}_flight", mock_up.imu.baud))

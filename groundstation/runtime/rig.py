@@ -126,6 +126,23 @@ class StarCameraSection(_Section):
     sigma_heading_rad: Positive = 0.0009
 
 
+class OverheadCameraSection(_Section):
+    """The camera over the table: where it is opened, its files, its delay and the floor of its errors.
+
+    ``circles`` says what each mock-up wears. The sigmas are what calibration of the camera and gluing of the
+    circles leave in every fix, beyond the covariance that comes with it.
+    """
+
+    address: str
+    camera: Path
+    circles: Path
+    delay_s: NonNegative = 0.0
+    delay_sigma_s: NonNegative = 0.002
+    timeout_s: Positive = 2.0
+    sigma_xy_m: Positive = 0.001
+    sigma_heading_rad: Positive = 0.003
+
+
 class FusionSection(_Section):
     """Which estimator, and how long the rest at the start must be."""
 
@@ -184,11 +201,26 @@ class VehicleSection(_Section):
     reference: str | None = None
     hold: HoldSection
     starts_by_itself: bool = True
+    fix_sources: tuple[Literal["stars", "overhead"], ...] = ()
+
+    @property
+    def has_stars(self) -> bool:
+        """Whether star fixes are made, or drawn in their place."""
+        return self.star_camera is not None or self.fixes is not None
+
+    @property
+    def fused(self) -> tuple[str, ...]:
+        """Whose fixes the estimator takes: those named, else the stars', else the overhead camera's."""
+        return self.fix_sources or (("stars",) if self.has_stars else ("overhead",))
 
     @model_validator(mode="after")
-    def _one_source_of_fixes(self) -> Self:
-        if (self.star_camera is None) == (self.fixes is None):
-            raise ValueError("needs exactly one of 'star_camera' and 'fixes'")
+    def _known_sources_of_fixes(self) -> Self:
+        if self.star_camera is not None and self.fixes is not None:
+            raise ValueError("needs only one of 'star_camera' and 'fixes'")
+        if len(set(self.fix_sources)) < len(self.fix_sources):
+            raise ValueError(f"fix_sources names a source twice: {', '.join(self.fix_sources)}")
+        if "stars" in self.fused and not self.has_stars:
+            raise ValueError("fix_sources 'stars' needs 'star_camera' or 'fixes'")
         return self
 
 
@@ -243,6 +275,7 @@ class Rig(_Section):
     mock_ups: dict[str, MockUpSection]
     vehicles: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")], VehicleSection] = Field(min_length=1)
     valve_bus: dict[str, Any] | str
+    overhead_camera: OverheadCameraSection | None = None
     record: RecordSection = RecordSection()
     nodes: dict[str, NodeSection] = Field(default_factory=dict)
     laboratory: LaboratorySection | None = None
@@ -282,6 +315,15 @@ class Rig(_Section):
                 raise ValueError(
                     f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera"
                 )
+            if "overhead" in vehicle.fused and self.overhead_camera is None:
+                missing = "" if vehicle.fix_sources else "needs one of 'star_camera' and 'fixes', or "
+                needs = missing or "fix_sources 'overhead' needs "
+                raise ValueError(f"vehicles.{name}: {needs}an [overhead_camera] section")
+            if len(vehicle.fused) > 1 and mock_up.fusion.method != "filter":
+                raise ValueError(
+                    f"vehicles.{name}.fix_sources: the estimator {mock_up.fusion.method!r} takes one source: "
+                    "choose 'filter', or name one"
+                )
             if vehicle.bus_index in indices:
                 other = indices[vehicle.bus_index]
                 raise ValueError(f"vehicles.{name}.bus_index: {vehicle.bus_index} is already that of {other}")
@@ -300,6 +342,9 @@ class Rig(_Section):
             for key, address in addresses.items():
                 if address is not None and address.startswith(LABORATORY) and self.laboratory is None:
                     raise ValueError(f"vehicles.{name}.{key}: {address!r} needs a [laboratory] section")
+        overhead = self.overhead_camera
+        if overhead is not None and overhead.address.startswith(LABORATORY) and self.laboratory is None:
+            raise ValueError(f"overhead_camera.address: {overhead.address!r} needs a [laboratory] section")
         return self
 
     def mock_up_of(self, vehicle: str) -> MockUpSection:
@@ -370,4 +415,10 @@ def _anchor(rig: Rig, folder: Path) -> Rig:
     table = rig.table
     if table.map is not None:
         table = table.model_copy(update={"map": folder / table.map})
+    overhead = rig.overhead_camera
+    if overhead is not None:
+        overhead = overhead.model_copy(
+            update={"camera": folder / overhead.camera, "circles": folder / overhead.circles}
+        )
+    rig = rig.model_copy(update={"overhead_camera": overhead})
     return rig.model_copy(update={"table": table, "mock_ups": mock_ups, "laboratory": laboratory})

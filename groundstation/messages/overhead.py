@@ -1,0 +1,89 @@
+"""What the camera over the table sees, and how its fixes compare with those of the star tracker."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from groundstation.messages.base import (
+    F64,
+    PACKAGE,
+    U8,
+    U16,
+    U32,
+    Bool,
+    Bytes,
+    Float64x3,
+    Float64x9,
+    Message,
+    Text,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OverheadImage(Message):
+    """One colour frame of the camera over the table; the stamp is the middle of the exposure."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    height: U32
+    width: U32
+    encoding: Text
+    is_bigendian: U8
+    step: U32
+    data: Bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OverheadFix(Message):
+    """Where the camera over the table sees one mock-up; the stamp is the middle of the exposure.
+
+    Attributes:
+        fix: Whether there is a pose; without one the pose is NaN and ``reason`` says why.
+        x_m: Body origin in the table frame.
+        y_m: Body origin in the table frame.
+        heading_rad: Heading in [-pi, pi).
+        covariance: Row-major 3 x 3 of (x, y, heading) in m and rad.
+        stamp_sigma_s: Standard deviation of the stamp against the host's clock.
+        circles: Number of circles used.
+        whole_circles: How many of them were seen whole.
+        misfit_m: RMS distance between the circles and the mock-up's pattern.
+        reason: Empty, or why there is no fix.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/OverheadFix"
+    fix: Bool
+    x_m: F64
+    y_m: F64
+    heading_rad: F64
+    covariance: Float64x9
+    stamp_sigma_s: F64
+    circles: U16
+    whole_circles: U16
+    misfit_m: F64
+    reason: Text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FixComparison(Message):
+    """One star fix against one overhead fix; the stamp is the star fix's exposure.
+
+    Attributes:
+        apart_s: Exposure of the overhead fix after that of the star fix.
+        difference: Star fix minus overhead fix, carried to one moment: x, y (m), heading (rad).
+        std: Standard deviations of the difference: x, y (m), heading (rad).
+        nis: Normalised difference squared, 3 degrees of freedom.
+        pairs: Compared lately; the following speak of them.
+        mean_difference: As ``difference``.
+        mean_nis: 3 where both sources are as good as they say.
+        verdict: ``too few``, ``agree`` or ``disagree``.
+        reason: What they disagree on, in words; empty otherwise.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixComparison"
+    apart_s: F64
+    difference: Float64x3
+    std: Float64x3
+    nis: F64
+    pairs: U16
+    mean_difference: Float64x3
+    mean_nis: F64
+    verdict: Text
+    reason: Text

@@ -1,0 +1,85 @@
+"""Overhead tracker: colour frames of the camera over the table in, a fix or a refusal per mock-up out."""
+
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from calibration.camera.liveries import load_liveries
+from calibration.camera.overhead_camera import OverheadCamera
+from groundstation.frames import wrap_angle
+from groundstation.messages.base import Message
+from groundstation.messages.definitions import CalibrationInUse, OverheadFix, OverheadImage
+from groundstation.nodes.node import Node
+from groundstation.star_tracking import overhead
+
+
+class OverheadTracker(Node):
+    """Finds every mock-up of the rig in each frame that it is given.
+
+    Args:
+        vehicles: Those to speak of; other mock-ups that the file of circles knows are told apart from them.
+        camera: Calibration file of the camera.
+        circles: File that says what each mock-up wears.
+        stamp_sigma_s: Standard deviation of the exposure's stamp.
+
+    Raises:
+        CalibrationFileError: A file is missing or wrong.
+    """
+
+    inputs = (OverheadImage,)
+    outputs = (OverheadFix, CalibrationInUse)
+
+    def __init__(self, vehicles: Sequence[str], camera: Path, circles: Path, stamp_sigma_s: float) -> None:
+        super().__init__("")
+        cv2.setNumThreads(1)  # results must not depend on the number of cores
+        self._vehicles = tuple(vehicles)
+        self._files = (camera, circles)
+        self._tracker = overhead.OverheadTracker(OverheadCamera.load(camera), load_liveries(circles))
+        self._stamp_sigma_s = stamp_sigma_s
+
+    def start(self, now_ns: int) -> Iterator[Message]:
+        content = [path.read_text() for path in self._files]
+        name = " ".join(path.name for path in self._files)
+        digest = hashlib.sha256("".join(content).encode()).hexdigest()
+        yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        del now_ns
+        assert isinstance(message, OverheadImage)
+        image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, 3)
+        try:
+            answers = self._tracker.look(image)
+        except ValueError as error:  # another camera than the file's
+            for vehicle in self._vehicles:
+                yield self._refusal(message.stamp_ns, vehicle, str(error))
+            return
+        for answer in answers:
+            if answer.vehicle not in self._vehicles:
+                continue
+            if isinstance(answer, overhead.NoOverheadFix):
+                yield self._refusal(message.stamp_ns, answer.vehicle, answer.reason)
+                continue
+            yield OverheadFix(
+                message.stamp_ns,
+                answer.vehicle,
+                True,
+                answer.x_m,
+                answer.y_m,
+                wrap_angle(answer.heading_rad),
+                tuple(answer.cov.ravel().tolist()),
+                self._stamp_sigma_s,
+                answer.circles,
+                answer.whole,
+                answer.misfit_m,
+                "",
+            )
+
+    def _refusal(self, stamp_ns: int, vehicle: str, reason: str) -> OverheadFix:
+        nan = math.nan
+        return OverheadFix(
+            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._stamp_sigma_s, 0, 0, nan, reason
+        )
