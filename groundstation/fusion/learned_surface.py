@@ -31,6 +31,7 @@ UNKNOWN_SHARE = 0.4
 Nodes twice as dense estimate no better."""
 MAX_NODES = 32
 """On a larger table the nodes farthest away are given up: 87 states bound the cost of a fix."""
+UNIT = np.eye(2)
 NUGGET = 1e-4
 """Of the variance, on the diagonal, against neighbours that are nearly one."""
 
@@ -65,10 +66,9 @@ class LearnedSurface:
         """
         d = (place_m - self.nodes_m) / self.length_m
         near = np.exp(-0.5 * np.einsum("ij,ij->i", d, d))
-        k = (np.eye(2)[:, None] - d.T[:, :, None] * d) * near[:, None]
-        k = k.reshape(2, -1)
+        k = ((UNIT[:, None] - d.T[:, :, None] * d) * near[:, None]).reshape(2, -1)
         w = k @ self.inverse
-        return w, np.eye(2) - w @ k.T
+        return w, UNIT - w @ k.T
 
     def slope(self, x: Array, place_m: Array) -> Array:
         """Return the expected slope (2,) at a place, given the filter's state (23 + 2m,)."""

@@ -23,12 +23,15 @@ WINDOW_S = 0.01
 def add_knocks(Q: Array, segment: Segment, flight: Flight, noise: NoiseModel) -> None:
     """Add to the process covariance Q (5, 5), in place, one knock wherever the force changes abruptly."""
     group = max(1, round(WINDOW_S / noise.packet_period_s))
-    firsts = np.arange(0, len(segment.span_s) - group + 1, group)
-    if len(firsts) < 2:
+    count = len(segment.span_s) // group
+    if count < 2:
         return
-    force = np.add.reduceat(flight.force_body, firsts, axis=1) / group
+    force, until_end_s = flight.force_body, flight.until_end_s
+    if group > 1:
+        force = force[:, : count * group].reshape(2, count, group).mean(axis=2)
+        until_end_s = until_end_s[: count * group : group]
     white = STEP_SIGMAS * noise.acc_density_m_s2_rthz / math.sqrt(group * noise.packet_period_s)
-    left = flight.until_end_s[firsts[1:]][(np.abs(np.diff(force, axis=1)) > white).any(axis=0)]
+    left = until_end_s[1:][(np.abs(force[:, 1:] - force[:, :-1]) > white).any(axis=0)]
     knock = noise.valve_knock_m_s**2
     vv, vp, pp = knock * len(left), knock * float(left.sum()), knock * float(left @ left)
     for v, p in ((VX, PX), (VY, PY)):
