@@ -15,9 +15,9 @@ def calibration_hashes(rig: Rig) -> dict[str, str]:
     hashes = {}
     for name, mock_up in rig.mock_ups.items():
         if mock_up.star_camera is not None:
-            for role in ("camera", "ceiling"):
-                path: Path = getattr(mock_up.star_camera, role)
-                if path.exists():
+            for role in ("camera", "ceiling", "delay_file"):
+                path: Path | None = getattr(mock_up.star_camera, role)
+                if path is not None and path.exists():
                     hashes[f"{name}.{role}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     for name, path in calibration_files(rig):
         if path.exists():

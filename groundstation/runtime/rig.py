@@ -13,6 +13,8 @@ import can
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from calibration.camera.delay_file import read_delay
+from calibration.camera.errors import CalibrationFileError
 from calibration.table.levelling import levelling
 from drivers.valve_bus.messages import MAX_VEHICLES
 from groundstation.control.registry import CONTROLLERS
@@ -113,17 +115,40 @@ class ImuSection(_Section):
 
 
 class StarCameraSection(_Section):
-    """The star camera: calibration files, delay from exposure to arrival, floor of its errors."""
+    """The star camera: calibration files, delay from exposure to arrival, floor of its errors.
+
+    ``delay_file`` is what `star-tracker delay` wrote; it stands for ``delay_s`` and ``delay_sigma_s``.
+    """
 
     camera: Path
     ceiling: Path
     delay_s: NonNegative = 0.0
     delay_sigma_s: NonNegative = 0.002
+    delay_file: Path | None = None
     timeout_s: Positive = 2.0
     exposure_s: NonNegative = 0.0
     readout_s: NonNegative = 0.0
     sigma_xy_m: Positive = 0.001
     sigma_heading_rad: Positive = 0.0009
+
+    @model_validator(mode="after")
+    def _one_delay(self) -> Self:
+        if self.delay_file is not None and self.model_fields_set & {"delay_s", "delay_sigma_s"}:
+            raise ValueError("give either 'delay_file' or 'delay_s' and 'delay_sigma_s'")
+        return self
+
+    def anchored(self, folder: Path) -> Self:
+        """The same with paths relative to a folder, and the delay of its file.
+
+        Raises:
+            CalibrationFileError: The delay's file is missing or wrong.
+        """
+        update: dict[str, Any] = {"camera": folder / self.camera, "ceiling": folder / self.ceiling}
+        if self.delay_file is not None:
+            update["delay_file"] = folder / self.delay_file
+            found = read_delay(update["delay_file"])
+            update |= {"delay_s": found.delay_s, "delay_sigma_s": found.sigma_s}
+        return self.model_copy(update=update)
 
 
 class OverheadCameraSection(_Section):
@@ -379,7 +404,10 @@ def parse_rig(text: str, path: Path) -> Rig:
         raise RigError(f"{path}: is not valid TOML: {error}") from error
     except ValidationError as error:
         raise RigError(f"{path}: {_first_sentence(error)}") from error
-    return _anchor(rig, path.parent)
+    try:
+        return _anchor(rig, path.parent)
+    except CalibrationFileError as error:
+        raise RigError(str(error)) from error
 
 
 def _first_sentence(error: ValidationError) -> str:
@@ -402,9 +430,7 @@ def _anchor(rig: Rig, folder: Path) -> Rig:
     for name, mock_up in rig.mock_ups.items():
         camera = mock_up.star_camera
         if camera is not None:
-            camera = camera.model_copy(
-                update={"camera": folder / camera.camera, "ceiling": folder / camera.ceiling}
-            )
+            camera = camera.anchored(folder)
         imu = mock_up.imu.model_copy(
             update={"calibration": tuple(folder / path for path in mock_up.imu.calibration)}
         )

@@ -54,6 +54,14 @@ WRONG = {
     "a vehicle called like a process": (
         DRAWN.replace("alpha", "commands"), "names both a vehicle and a process",
     ),
+    "a delay file that is not there": (
+        RENDERED.replace("delay_s = 0.015\ndelay_sigma_s = 0.001", 'delay_file = "nowhere.toml"', 1),
+        "nowhere.toml: cannot be read",
+    ),
+    "a delay twice": (
+        RENDERED.replace("delay_s = 0.015\n", 'delay_s = 0.015\ndelay_file = "delay.toml"\n', 1),
+        "give either 'delay_file' or 'delay_s'",
+    ),
     "a calibration file that is not there": (
         RENDERED.replace("calibration/rigs/emulated/ceiling.csv\"\ndelay_s", "nowhere.csv\"\ndelay_s"),
         "nowhere.csv",
