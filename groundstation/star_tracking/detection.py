@@ -32,6 +32,9 @@ class DetectorSettings:
         gain_dn_per_electron: Shot noise of the stars: variance in DN^2 per DN of light.
         max_spots: The brightest so many are kept.
         max_lit_ratio: With more of the picture above threshold it is flooded, not starred.
+
+    Raises:
+        ValueError: A limit is not one.
     """
 
     threshold_sigmas: float = 5.0
@@ -40,6 +43,13 @@ class DetectorSettings:
     gain_dn_per_electron: float = 0.04
     max_spots: int = 120
     max_lit_ratio: float = 0.15
+
+    def __post_init__(self) -> None:
+        if self.max_spots < 0 or not 0.0 <= self.max_lit_ratio <= 1.0:
+            raise ValueError(
+                "a detector needs max_spots of 0 or more and max_lit_ratio between 0 and 1, found "
+                f"{self.max_spots} and {self.max_lit_ratio}"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -185,9 +185,17 @@ def test_both_refuse_what_is_no_picture(both, image):
             detector.find(image)
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"max_spots": -1}, {"max_lit_ratio": 1.5}, {"max_lit_ratio": float("nan")}]
+)
+def test_limits_that_are_none_are_refused(wrong):
+    with pytest.raises(ValueError, match="max_spots of 0 or more"):
+        DetectorSettings(**wrong)
+
+
 @pytest.mark.slow
 def test_wider_vectors_give_the_same_bits(compiled_core, painter, tmp_path):
-    plain = load_core(compile_core(tmp_path / "plain.so", ("-DGS_NO_CLONES",)))
+    plain = load_core(compile_core(tmp_path / "plain.so", ("-DGS_NO_CLONES", "-Werror")))
     for velocity in ((0.0, 0.0, 0.0), (0.6, 0.2, 1.5)):
         image = painter.paint(np.random.default_rng(9), (2.5, 2.0, 0.4), velocity, exposure_s=0.04)
         one, two = Detector(core=compiled_core).find(image), Detector(core=plain).find(image)
