@@ -77,7 +77,7 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     size = max(4, round(BLOCK_S / period)) if n > 1 and period > 0.0 else 4
     if n < 4 * size:
         raise NotARest(f"a rest of {4 * BLOCK_S:g} s or more is needed, found {n} packets")
-    sigma = _packet_sigma(readings)
+    sigma = packet_sigma(readings)
     median = np.median(readings, axis=0)
     blocks = np.arange(n) // size
     is_wild = _wild(readings, median, sigma)
@@ -119,7 +119,7 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     return ZeroOffset(kept.mean(axis=0), std, sigma, warmth, len(kept), float(t_s[-1] - t_s[0]), tuple(found))
 
 
-def _packet_sigma(readings: Array) -> Array:
+def packet_sigma(readings: Array) -> Array:
     """Return the white noise of a packet from first differences, deaf to drift and to wild packets.
 
     The median alone would be fooled by quantisation, where most differences may be the same few steps.

@@ -12,24 +12,22 @@ import typer
 
 from calibration.imu.result import CalibrationResult, Quantity, provenance_of
 from calibration.imu.zero_offset import NotARest, ZeroOffset, zero_offset
-from groundstation.cli import calibrate_flight, calibrate_guided, table_map
+from groundstation.cli import calibrate_flight, calibrate_guided, calibrate_tilt, table_map
 from groundstation.cli.errors import UsageError
-from groundstation.cli.fusion_folder import (
-    IMU_COLUMNS,
-    STAR_COLUMNS,
-    Array,
-    read_known,
-    read_table,
-    write_atomically,
-)
+from groundstation.cli.flight_data import read_flight
+from groundstation.cli.fusion_folder import Array, FusionFolder, write_atomically
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
-FolderArgument = Annotated[Path, typer.Argument(help="Folder with imu.csv (and stars.csv, meta.json).")]
+FolderArgument = Annotated[
+    Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, meta.json (and stars.csv).")
+]
 OutOption = Annotated[Path, typer.Option(help="TOML to write.")]
 PlotOption = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
+VehicleOption = Annotated[str | None, typer.Option(help="Of a recording with several vehicles.")]
 app.command("joint")(calibrate_flight.joint)
 app.command("imu")(calibrate_guided.imu)
+app.command("tilt")(calibrate_tilt.tilt)
 app.command("table-map")(table_map.table_map)
 UNITS = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}
 
@@ -43,13 +41,15 @@ def _root() -> None:
 
 
 @app.command("zero-offset")
-def zero_offset_command(folder: FolderArgument, out: OutOption, plot: PlotOption = None) -> None:
+def zero_offset_command(
+    folder: FolderArgument, out: OutOption, plot: PlotOption = None, vehicle: VehicleOption = None
+) -> None:
     """Mean of the rest at the start, after a test that it was one.
 
     Example: groundstation calibrate zero-offset samples/fusion/station --out rest.toml
     """
-    known, imu = read_known(folder / "meta.json"), _read_imu(folder)
-    found = _rest(folder, known, imu)
+    data = read_flight(folder, vehicle, with_stars=False)
+    found = _rest(folder, data)
     quantities = {
         f"{name}_offset": Quantity(float(found.mean[k]), float(found.std[k]), UNITS[name])
         for k, name in enumerate(UNITS)
@@ -74,7 +74,7 @@ def zero_offset_command(folder: FolderArgument, out: OutOption, plot: PlotOption
     if plot is not None:
         from groundstation.cli.calibration_plots import plot_rest
 
-        plot_rest(imu[imu[:, 0] <= known["run_start_s"]], found, plot)
+        plot_rest(at_rest(data), found, plot)
 
 
 @app.command("zero-offset-fit")
@@ -83,6 +83,8 @@ def zero_offset_fit(
     start_s: Annotated[float, typer.Option(help="Start of the stretch of flight.")],
     end_s: Annotated[float, typer.Option(help="End of the stretch of flight.")],
     out: OutOption,
+    plot: PlotOption = None,
+    vehicle: VehicleOption = None,
 ) -> None:
     """Least squares for the accelerometers' constant offsets (mu, nu) over a stretch, as published.
 
@@ -92,13 +94,13 @@ def zero_offset_fit(
 
     if not end_s > start_s:
         raise UsageError(f"--end-s must be after --start-s, found {start_s:g} and {end_s:g}.")
-    known, imu = read_known(folder / "meta.json"), _read_imu(folder)
-    stars = read_table(folder / "stars.csv", STAR_COLUMNS)
-    null = float(_rest(folder, known, imu).mean[0]) if known["run_start_s"] > 1.0 else 0.0
-    lever = (known["imu_offset_m"][0], known["imu_offset_m"][1])
-    sigma = (known["star_sigma_xy_m"], known["star_sigma_heading_rad"])
+    data = read_flight(folder, vehicle)
+    noise = data.noise
+    null = float(_rest(folder, data).mean[0]) if data.run_start_s > 1.0 else 0.0
+    lever = (noise.imu_offset_x_m, noise.imu_offset_y_m)
+    sigma = (noise.star_sigma_xy_m, noise.star_sigma_heading_rad)
     try:
-        fit, refused = fit_stretch(imu, stars, start_s, end_s, null, lever, sigma)
+        fit, refused = fit_stretch(data.imu, data.stars, start_s, end_s, null, lever, sigma)
     except ValueError as error:
         raise UsageError(f"{folder} from {start_s:g} to {end_s:g} s: {error}.") from None
     std = np.sqrt(np.diag(fit.cov))
@@ -111,18 +113,23 @@ def zero_offset_fit(
         {"position": Quantity(fit.residual_rms_m, math.nan, "m")},
         {"start_s": start_s, "end_s": end_s, "fixes": fit.fixes, "fixes_refused": refused},
     )  # fmt: skip
+    if plot is not None:
+        from groundstation.cli.calibration_plots import plot_offset_fit
+
+        plot_offset_fit(fit.residual_m, plot)
 
 
 @app.command()
-def temperature(folder: FolderArgument, out: OutOption, plot: PlotOption = None) -> None:
+def temperature(
+    folder: FolderArgument, out: OutOption, plot: PlotOption = None, vehicle: VehicleOption = None
+) -> None:
     """Temperature slopes of the gyro's null and the tilt offsets, from a long rest that warms up.
 
     Example: groundstation calibrate temperature warm_up/ --out temperature.toml
     """
     from calibration.imu.temperature import temperature_slope
 
-    known, imu = read_known(folder / "meta.json"), _read_imu(folder)
-    rest = imu[imu[:, 0] <= known["run_start_s"]]
+    rest = at_rest(read_flight(folder, vehicle, with_stars=False))
     try:
         found = temperature_slope(rest[:, 0], rest[:, 1:4], rest[:, 4])
     except (ValueError, IndexError) as error:
@@ -147,20 +154,21 @@ def temperature(folder: FolderArgument, out: OutOption, plot: PlotOption = None)
 
 
 @app.command("gyro-scale")
-def gyro_scale_command(folder: FolderArgument, out: OutOption, plot: PlotOption = None) -> None:
+def gyro_scale_command(
+    folder: FolderArgument, out: OutOption, plot: PlotOption = None, vehicle: VehicleOption = None
+) -> None:
     """Gyro scale by full turns against the stars.
 
     Example: groundstation calibrate gyro-scale samples/fusion/spin --out scale.toml
     """
     from calibration.imu.gyro_scale import gyro_scale
 
-    known, imu = read_known(folder / "meta.json"), _read_imu(folder)
-    stars = read_table(folder / "stars.csv", STAR_COLUMNS)
-    stars = stars[np.argsort(stars[:, 0], kind="stable")]
-    null = float(_rest(folder, known, imu).mean[0]) if known["run_start_s"] > 1.0 else 0.0
+    data = read_flight(folder, vehicle)
+    imu, stars = data.imu, data.stars[np.argsort(data.stars[:, 0], kind="stable")]
+    null = float(_rest(folder, data).mean[0]) if data.run_start_s > 1.0 else 0.0
     good = np.isfinite(imu[:, 1]) & (np.abs(imu[:, 1]) < math.radians(400.0))
     t, omega = imu[good, 0], imu[good, 1]
-    span = np.diff(t, prepend=t[0] - 1.0 / known["imu_rate_hz"])
+    span = np.diff(t, prepend=t[0] - data.noise.packet_period_s)
     try:
         found = gyro_scale(t, span, _without_spikes(omega), stars[:, 0], stars[:, 4], null)
     except ValueError as error:
@@ -181,19 +189,20 @@ def gyro_scale_command(folder: FolderArgument, out: OutOption, plot: PlotOption 
 
 
 @app.command()
-def allan(folder: FolderArgument, out: OutOption, plot: PlotOption = None) -> None:
+def allan(
+    folder: FolderArgument, out: OutOption, plot: PlotOption = None, vehicle: VehicleOption = None
+) -> None:
     """Allan deviation: white noise, bias instability, from a long rest.
 
     Example: groundstation calibrate allan night_at_rest/ --out noise.toml --plot noise.png
     """
     from calibration.imu.allan import allan_deviation, bridge_holes
 
-    known, imu = read_known(folder / "meta.json"), _read_imu(folder)
-    rest = imu[imu[:, 0] <= known["run_start_s"]]
-    found_rest = _rest(folder, known, imu)
+    data = read_flight(folder, vehicle, with_stars=False)
+    rest, found_rest = at_rest(data), _rest(folder, data)
     wild = {d.start_s for d in found_rest.disturbances if d.kind == "wild packet"}
     rest = rest[[t not in wild for t in rest[:, 0].tolist()]]
-    period = 1.0 / known["imu_rate_hz"]
+    period = data.noise.packet_period_s
     even = bridge_holes(rest[:, 0], rest[:, 1:4], period)
     try:
         curves = {name: allan_deviation(even[:, k], period) for k, name in enumerate(UNITS)}
@@ -216,16 +225,13 @@ def allan(folder: FolderArgument, out: OutOption, plot: PlotOption = None) -> No
         plot_allan(curves, UNITS, plot)
 
 
-def _read_imu(folder: Path) -> Array:
-    """Return the packets with finite, rising stamps."""
-    imu = read_table(folder / "imu.csv", IMU_COLUMNS)
-    imu = imu[np.isfinite(imu[:, 0])]
-    rising = imu[:, 0] > np.maximum.accumulate(np.concatenate([[-np.inf], imu[:-1, 0]]))
-    return imu[rising]
+def at_rest(data: FusionFolder) -> Array:
+    """Return the packets of the rest at the start."""
+    return data.imu[data.imu[:, 0] <= data.run_start_s]
 
 
-def _rest(folder: Path, known: dict[str, Any], imu: Array) -> ZeroOffset:
-    rest = imu[imu[:, 0] <= known["run_start_s"]]
+def _rest(folder: Path, data: FusionFolder) -> ZeroOffset:
+    rest = at_rest(data)
     try:
         return zero_offset(rest[:, 0], rest[:, 1:4], rest[:, 4])
     except NotARest as error:

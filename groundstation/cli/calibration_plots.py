@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from calibration.imu.allan import AllanDeviation
 from calibration.imu.gyro_scale import GyroScale
 from calibration.imu.temperature import TemperatureSlope
+from calibration.imu.tilt_axes import TiltAxes
 from calibration.imu.zero_offset import ZeroOffset
 from groundstation.cli.errors import UsageError
 
@@ -115,4 +116,42 @@ def plot_residuals(residual: Array, nis: Array, path: Path) -> None:
     axes[3].set_ylabel("NIS")
     axes[3].legend()
     axes[3].set_xlabel("exposure, s")
+    _save(figure, path)
+
+
+def plot_tilt(found: TiltAxes, path: Path) -> None:
+    """Draw what is left of each rest's readings, with the sigmas expected of it."""
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    number = np.arange(1, len(found.residual_m_s2) + 1)
+    for k, axes in enumerate(_axes(figure, 2)):
+        axes.errorbar(
+            number,
+            1e3 * found.residual_m_s2[:, k],
+            1e3 * found.residual_std_m_s2[:, k],
+            fmt="o",
+            markersize=4,
+        )
+        axes.axhline(0.0, color="0.6", linewidth=0.8)
+        axes.set_ylabel(f"reading less fit, a{'xy'[k]}, mm/s²")
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("rest")
+    axes.set_xticks(number)
+    figure.suptitle(
+        f"{len(number)} rests, chi-square ratio {found.chi_square_ratio:.2f}"
+        + "".join(f"\nunknown: {words}" for words in found.unknown),
+        fontsize=10,
+    )
+    _save(figure, path)
+
+
+def plot_offset_fit(residual_m: Array, path: Path) -> None:
+    """Draw how far the integrated way of the published fit misses the fixes, (2, m)."""
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    number = np.arange(2, residual_m.shape[1] + 2)
+    for k, axes in enumerate(_axes(figure, 2)):
+        axes.plot(number, 1e3 * residual_m[k], ".-", linewidth=0.6)
+        axes.axhline(0.0, color="0.6", linewidth=0.8)
+        axes.set_ylabel(f"fix less integration, {'xy'[k]}, mm")
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("fix of the stretch")
     _save(figure, path)
