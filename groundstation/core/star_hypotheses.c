@@ -5,7 +5,7 @@
 static void offer(Ballot *ballot, Point turn, Point shift_m)
 {
     const double gate = 2.0 * ballot->sky->tolerance_m, gate2 = gate * gate;
-    const int64_t last = ballot->count == REFINED ? ballot->best[REFINED - 1].votes : -1;
+    const int64_t last = ballot->count == RIVALS ? ballot->best[RIVALS - 1].votes : -1;
     int64_t votes = 0;
     ballot->offered++;
     for (int64_t i = 0; i < ballot->spots; i++) {
@@ -16,7 +16,7 @@ static void offer(Ballot *ballot, Point turn, Point shift_m)
             return;
         }
     }
-    int64_t at = ballot->count < REFINED ? ballot->count++ : REFINED - 1;
+    int64_t at = ballot->count < RIVALS ? ballot->count++ : RIVALS - 1;
     for (; at > 0 && ballot->best[at - 1].votes < votes; at--) {
         ballot->best[at] = ballot->best[at - 1];
     }

@@ -48,12 +48,13 @@ static SkySearch begin(const Sky *sky, const Rays *rays, const SearchSettings *s
 static int track(SkySearch *s)
 {
     const StarPicture *p = s->picture;
-    const Point turn = unit_at(p->prior_heading_rad), shift_m = {p->prior_x_m, p->prior_y_m};
+    Candidate prior = {unit_at(p->prior_heading_rad), {p->prior_x_m, p->prior_y_m}, 0};
+    double nats;
     const double sideways = sqrt(fmax(p->prior_cov[0], p->prior_cov[4]));
     const double turning = 0.5 * s->rays->reach_m * sqrt(p->prior_cov[8]);
     const double sigma = sqrt(sideways * sideways + turning * turning);
     const double gate_m = fmin(3.0 * sigma + 2.0 * s->sky->tolerance_m, 0.1);
-    return settle(s, turn, shift_m, gate_m, 1);
+    return settle(s, &prior, gate_m, 1, &nats);
 }
 
 /* Whether a pose like this one was tried before; else it is noted. */
@@ -75,21 +76,61 @@ static Ballot open_ballot(const SkySearch *s, int64_t spots)
     return (Ballot){.sky = s->sky, .q = s->q, .spots = spots, .room = s->look_ups_left / spots};
 }
 
-/* Settle the poses that most spots agree with. */
-static int close_ballot(SkySearch *s, const Ballot *ballot)
+/* Whether two poses put the spots about where the other does: their middle, and the heading. */
+static int is_same(const Ballot *ballot, Point middle, const Candidate *a, const Candidate *b)
 {
+    const Point turn = sub(a->turn, b->turn), off = add(turned(turn, middle), sub(a->shift_m, b->shift_m));
+    return length_of(off) < 4.0 * ballot->sky->tolerance_m && length_of(turn) < 0.03;
+}
+
+/* Settle the poses that most spots agree with, and look for rivals of a fix (PureSearch._best); whether to stop. */
+static int close_ballot(SkySearch *s, Ballot *ballot)
+{
+    const double gate_m = 2.5 * s->sky->tolerance_m;
+    double needed = (double)s->settings->min_stars, fix_nats = -INFINITY, rival_nats = -INFINITY, nats;
+    Candidate fix = {0};
+    Point middle = {0.0, 0.0};
+    for (int64_t i = 0; i < ballot->spots; i++) {
+        middle = add(middle, scaled(ballot->q[i], 1.0 / (double)ballot->spots));
+    }
     s->look_ups_left -= ballot->offered * ballot->spots;
-    for (int64_t i = 0; i < ballot->count && ballot->best[i].votes >= s->settings->min_stars; i++) {
+    for (int64_t i = 0; i < ballot->count; i++) {
+        Candidate *candidate = &ballot->best[i];
+        const double votes = (double)candidate->votes;
+        const int has_fix = fix.votes > 0;
+        if (votes < needed || (!has_fix && i >= REFINED)) {
+            break;
+        }
+        if (has_fix && is_same(ballot, middle, candidate, &fix)) {
+            continue;
+        }
         if (s->cells == s->settings->candidates) {
             s->look_ups_left = 0;
-            return 0;
+            break;
         }
-        const Point turn = ballot->best[i].turn, shift_m = ballot->best[i].shift_m;
-        if (!is_tried(s, turn, shift_m) && settle(s, turn, shift_m, 2.5 * s->sky->tolerance_m, 0)) {
-            return 1;
+        if (is_tried(s, candidate->turn, candidate->shift_m) || !settle(s, candidate, gate_m, 0, &nats)) {
+            continue;
+        }
+        if (!has_fix) {
+            fix = *candidate;
+            fix_nats = nats;
+            needed = fmax(needed, 0.8 * votes); /* with fewer votes a place is no rival */
+        } else if (!is_same(ballot, middle, candidate, &fix)) {
+            rival_nats = fmax(rival_nats, fmin(fix_nats, nats));
+            if (nats > fix_nats) {
+                fix = *candidate;
+                fix_nats = nats;
+            }
         }
     }
-    return 0;
+    if (fix.votes == 0) {
+        return 0;
+    }
+    if (!(fix_nats - rival_nats >= s->settings->rival_nats)) {
+        s->picture->is_fix = 0;
+        s->picture->is_ambiguous = 1;
+    }
+    return 1;
 }
 
 static int lost_in_space(SkySearch *s)
@@ -133,7 +174,7 @@ static int lost_in_space(SkySearch *s)
 GS_EXPORT void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
 {
     SkySearch s = begin(sky, rays, settings, picture);
-    picture->is_fix = 0;
+    picture->is_fix = picture->is_ambiguous = 0;
     picture->best_nats = -INFINITY;
     look_up_rays(rays, picture->spots, picture->u_px, picture->v_px, s.q, s.jacobian);
     Smear smear;

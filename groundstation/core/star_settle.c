@@ -133,12 +133,14 @@ static void answer(SkySearch *s, int64_t n, const Pose *pose, double nats, int h
     }
 }
 
-/* Refine one candidate with a shrinking gate and put it to the test. */
-int settle(SkySearch *s, Point turn, Point shift_m, double gate_m, int has_prior)
+/* Refine one candidate with a shrinking gate and put it to the test; the candidate becomes the refined pose.
+ *
+ * The answer is written unless the picture has a better one. */
+int settle(SkySearch *s, Candidate *candidate, double gate_m, int has_prior, double *nats)
 {
     const double tolerance = s->sky->tolerance_m;
     const int64_t needed = has_prior ? s->settings->min_stars_prior : s->settings->min_stars;
-    Pose pose = {.turn = turn, .shift_m = shift_m};
+    Pose pose = {.turn = candidate->turn, .shift_m = candidate->shift_m};
     int64_t n = 0;
     for (int round = 0; round < 3; round++) {
         const Point *q = at_middle(s, pose.turn);
@@ -159,17 +161,21 @@ int settle(SkySearch *s, Point turn, Point shift_m, double gate_m, int has_prior
         }
         gate_m = fmax(0.4 * gate_m, 1.2 * tolerance);
     }
-    const double nats = judge(s, s->q_matched, n, &pose, has_prior);
+    candidate->turn = pose.turn;
+    candidate->shift_m = pose.shift_m;
+    *nats = judge(s, s->q_matched, n, &pose, has_prior);
     StarPicture *p = s->picture;
-    if (nats > p->best_nats) {
-        p->best_nats = nats;
+    if (*nats > p->best_nats) {
+        p->best_nats = *nats;
         p->guess[0] = pose.shift_m.x;
         p->guess[1] = pose.shift_m.y;
         p->guess[2] = atan2(pose.turn.y, pose.turn.x);
     }
-    if (!(nats >= s->settings->evidence_nats) || pose.kept < needed) {
+    if (!(*nats >= s->settings->evidence_nats) || pose.kept < needed) {
         return 0;
     }
-    answer(s, n, &pose, nats, has_prior);
+    if (!p->is_fix || *nats > p->evidence_nats) {
+        answer(s, n, &pose, *nats, has_prior);
+    }
     return 1;
 }

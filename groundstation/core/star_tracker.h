@@ -39,7 +39,7 @@ typedef struct {
 /* tracker.TrackerSettings and the constants of hypotheses, refinement, evidence and motion. */
 typedef struct {
     int64_t min_stars, min_stars_prior, identified_spots, pair_spots, pair_spots_total, look_ups, candidates;
-    double centre_floor_px, streak_floor_ratio, evidence_nats, exposure_s, readout_s;
+    double centre_floor_px, streak_floor_ratio, evidence_nats, rival_nats, exposure_s, readout_s;
     const double *sigmas_px;
     int64_t sigmas;
     double stray_ratio;
@@ -64,7 +64,7 @@ typedef struct {
     double vx_table_m_s, vy_table_m_s, omega_rad_s;
     double *doubles;   /* scratch, gs_star_doubles() */
     int32_t *integers; /* scratch, gs_star_integers(), zero at first */
-    int64_t is_fix, is_tracked, stars;
+    int64_t is_fix, is_tracked, is_ambiguous, stars;
     double x_m, y_m, heading_rad, cov[9], evidence_nats;
     double best_nats, guess[3];       /* of a refused picture */
     int32_t *spot_index, *star_index; /* (stars,), room for every spot */
@@ -121,7 +121,7 @@ static inline int64_t nearest_star(const Sky *sky, Point at, double *distance2)
 }
 
 /* The best few poses of one look-up, by votes and then by order of arrival. */
-enum { REFINED = 4 };
+enum { REFINED = 4, RIVALS = 16 };
 
 typedef struct {
     Point turn, shift_m;
@@ -132,7 +132,7 @@ typedef struct {
     const Sky *sky;
     const Point *q;
     int64_t spots, room, offered, count;
-    Candidate best[REFINED];
+    Candidate best[RIVALS];
 } Ballot;
 
 void offer_triangles(const SearchSettings *settings, int64_t group, double *scratch, int32_t *neighbour,
@@ -153,6 +153,6 @@ typedef struct {
     int64_t look_ups_left, cells;
 } SkySearch;
 
-int settle(SkySearch *s, Point turn, Point shift_m, double gate_m, int has_prior);
+int settle(SkySearch *s, Candidate *candidate, double gate_m, int has_prior, double *nats);
 
 #endif

@@ -58,7 +58,10 @@ class _Settings(Structure):
     _fields_: ClassVar = [
         *((name, c_int64) for name in ("min_stars", "min_stars_prior", "identified_spots")),
         *((name, c_int64) for name in ("pair_spots", "pair_spots_total", "look_ups", "candidates")),
-        *((name, c_double) for name in ("centre_floor_px", "streak_floor_ratio", "evidence_nats")),
+        *(
+            (name, c_double)
+            for name in ("centre_floor_px", "streak_floor_ratio", "evidence_nats", "rival_nats")
+        ),
         *((name, c_double) for name in ("exposure_s", "readout_s")),
         ("sigmas_px", c_void_p),
         ("sigmas", c_int64),
@@ -83,7 +86,7 @@ class _Picture(Structure):
         ("has_motion", c_int64),
         *((name, c_double) for name in ("vx_table_m_s", "vy_table_m_s", "omega_rad_s")),
         *((name, c_void_p) for name in ("doubles", "integers")),
-        *((name, c_int64) for name in ("is_fix", "is_tracked", "stars")),
+        *((name, c_int64) for name in ("is_fix", "is_tracked", "is_ambiguous", "stars")),
         *((name, c_double) for name in ("x_m", "y_m", "heading_rad")),
         ("cov", c_double * 9),
         *((name, c_double) for name in ("evidence_nats", "best_nats")),
@@ -148,7 +151,7 @@ class CompiledSearch:
         self._solve(*self._arguments)
         if not picture.is_fix:
             guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
-            return Found(None, picture.best_nats, guess)
+            return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
         stars = picture.stars
         fix = StarFix(
             x_m=picture.x_m,

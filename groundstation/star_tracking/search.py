@@ -36,6 +36,9 @@ from groundstation.star_tracking.sky_index import SkyIndex
 Complex = NDArray[np.complex128]
 
 _REFINED = 4  # of the poses of one look-up
+_RIVALS = 16  # so many are looked at for another place that would do as well
+_RIVAL_VOTES_RATIO = 0.8  # of the votes of the fix: with fewer a place is no rival
+_SAME_RAD = 0.03
 _TRIED_M, _TRIED_RAD = 0.05, 0.02  # poses nearer to each other than about this would refine to the same one
 
 
@@ -47,11 +50,13 @@ class Found:
         fix: The pose, if one was found and believed.
         best_nats: Best log likelihood over chance of any pose that was refined.
         best_guess: That pose.
+        is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
     """
 
     fix: StarFix | None
     best_nats: float
     best_guess: PoseGuess | None
+    is_ambiguous: bool = False
 
 
 class Search(Protocol):
@@ -94,7 +99,7 @@ class PureSearch:
         fix = None if prior is None else self._track(sighting, prior)
         if fix is None and len(spots) >= self._settings.min_stars:
             fix = self._lost_in_space(sighting)
-        return Found(fix, sighting.best_nats, sighting.best_guess)
+        return Found(fix, sighting.best_nats, sighting.best_guess, sighting.is_ambiguous)
 
     def _track(self, sighting: Sighting, prior: PosePrior) -> StarFix | None:
         turn, shift = np.exp(1j * prior.heading_rad), complex(prior.x_table_m, prior.y_table_m)
@@ -127,7 +132,11 @@ class PureSearch:
         return None
 
     def _best(self, sighting: Sighting, q: Complex, poses: Poses) -> StarFix | None:
-        """Test all poses, settle the few that most spots agree with."""
+        """Test all poses, settle the few that most spots agree with, and look for rivals of a fix.
+
+        A ceiling that repeats itself (LEDs in rows and columns) explains a picture in many places: of
+        such fixes the best one is believed only if it stands out.
+        """
         room = max(sighting.look_ups_left // max(len(q), 1), 0)
         turn, shift = poses.turn[:room], poses.shift_m[:room]
         if len(turn) == 0:
@@ -135,9 +144,13 @@ class PureSearch:
         sighting.look_ups_left -= len(turn) * len(q)
         _, distance = self._sky.nearest(turn[:, None] * q + shift[:, None])
         votes = np.count_nonzero(distance < 2.0 * self._sky.tolerance_m, axis=1)
-        for candidate in np.argsort(-votes, kind="stable")[:_REFINED]:
-            if votes[candidate] < self._settings.min_stars:
+        fix: StarFix | None = None
+        needed, rival_nats = float(self._settings.min_stars), -math.inf
+        for rank, candidate in enumerate(np.argsort(-votes, kind="stable")[:_RIVALS]):
+            if votes[candidate] < needed or (fix is None and rank >= _REFINED):
                 break
+            if fix is not None and self._is_same(q, turn[candidate], shift[candidate], fix):
+                continue
             if len(sighting.tested) >= self._settings.candidates:
                 sighting.look_ups_left = 0
                 break
@@ -150,7 +163,22 @@ class PureSearch:
                 continue
             sighting.tested.add(cell)
             gate = 2.5 * self._sky.tolerance_m
-            fix = self._settler.settle(sighting, turn[candidate], shift[candidate], gate, None)
-            if fix is not None:
-                return fix
-        return None
+            found = self._settler.settle(sighting, turn[candidate], shift[candidate], gate, None)
+            if found is None:
+                continue
+            if fix is None:
+                fix, needed = found, max(needed, _RIVAL_VOTES_RATIO * votes[candidate])
+            elif not self._is_same(q, np.exp(1j * found.heading_rad), complex(found.x_m, found.y_m), fix):
+                rival_nats = max(rival_nats, min(fix.evidence_nats, found.evidence_nats))
+                fix = max(fix, found, key=lambda one: one.evidence_nats)
+        if fix is not None and not fix.evidence_nats - rival_nats >= self._settings.rival_nats:
+            sighting.is_ambiguous = True
+            sighting.look_ups_left = 0
+            return None
+        return fix
+
+    def _is_same(self, q: Complex, turn: complex, shift: complex, fix: StarFix) -> bool:
+        """Whether a pose puts the spots about where a fix does: their middle, and the heading."""
+        fix_turn, middle = np.exp(1j * fix.heading_rad), q.mean()
+        off = abs((turn - fix_turn) * middle + shift - complex(fix.x_m, fix.y_m))
+        return bool(off < 4.0 * self._sky.tolerance_m and abs(turn - fix_turn) < _SAME_RAD)

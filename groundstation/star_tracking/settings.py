@@ -14,6 +14,7 @@ class TrackerSettings:
         centre_floor_px: Error of a centre that no fit knows of (PSF, survey), one sigma per axis.
         streak_floor_ratio: The same for streaks, per length: their true shape is not quite the fitted one.
         evidence_nats: Log likelihood over chance that a fix must have: e^-t bounds the false ones.
+        rival_nats: Log likelihood that a fix must have over the next best place of the catalogue.
         evidence_sigmas_px: Errors of spots that the likelihood is averaged over.
         min_stars: Stars of a fix without a prior.
         min_stars_prior: Stars of a fix with a prior.
@@ -30,6 +31,7 @@ class TrackerSettings:
     centre_floor_px: float = 0.012
     streak_floor_ratio: float = 0.002
     evidence_nats: float = 10.5
+    rival_nats: float = 30.0
     evidence_sigmas_px: tuple[float, ...] = SIGMAS_PX
     min_stars: int = 4
     min_stars_prior: int = 3

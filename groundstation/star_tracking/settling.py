@@ -31,6 +31,7 @@ class Sighting:
         tested: Cells of the poses refined so far.
         best_nats: Best log likelihood over chance among these.
         best_guess: The pose that had it.
+        is_ambiguous: Two places explain the picture.
     """
 
     spots: Spots
@@ -40,6 +41,7 @@ class Sighting:
     tested: set[tuple[int, int, int]] = field(default_factory=set)
     best_nats: float = -math.inf
     best_guess: PoseGuess | None = None
+    is_ambiguous: bool = False
 
 
 class Settler:

@@ -96,6 +96,9 @@ class StarTracker:
             length = np.hypot(spots.streak_px[:, 0], spots.streak_px[:, 1])
             reason = Refusal.BLURRED
             detail = f"{n} spots, most of them streaks of {float(np.median(length)):.0f} px."
+        elif found.is_ambiguous:
+            reason, detail = Refusal.NO_CONSENSUS, "More than one place of the catalogue explains the spots."
+            guess = found.best_guess
         elif math.isfinite(found.best_nats) and found.best_nats > 0.0:
             reason, detail = Refusal.NO_CONSENSUS, "A pose explains some spots, but chance could as well."
             guess = found.best_guess
