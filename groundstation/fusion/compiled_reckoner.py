@@ -32,6 +32,7 @@ _EVENTS = (
     (_DISAGREE, "packet_ticks_and_stamps_disagree"),
 )
 _pack = Struct("=q5d").pack_into
+_pack_state = Struct("=20d").pack_into  # from gyro_bias to py
 _unpack_state = Struct("=q12d?").unpack_from
 _ROW_BYTES = 8 * COLUMNS
 
@@ -133,7 +134,7 @@ class CompiledReckoner:
         memory.rest_from_s, memory.rest_to_s = math.inf, -math.inf
         memory.temperature_c = memory.reference_c = math.nan
         memory.is_lost = 1
-        self._unpack(es.initial_state(noise))
+        self._unpack(es.initial_state(noise), np.zeros(es.MOVING))
 
     @property
     def origin_ns(self) -> int | None:
@@ -270,33 +271,39 @@ class CompiledReckoner:
         """
         memory = self._memory
         memory.has_pose = 1
-        memory.theta, memory.vx, memory.vy, memory.px, memory.py = moved.tolist()
-        self._unpack(x)
+        self._unpack(x, moved)
         if memory.rest_from_s <= memory.newest_s <= memory.rest_to_s:
             memory.omega = memory.force_x = memory.force_y = 0.0
         else:
             memory.omega = (memory.good_omega - memory.bg) * memory.gyro_gain
 
-    def _unpack(self, state: Array) -> None:
-        memory, x = self._memory, state.tolist()
-        memory.gyro_bias, memory.gyro_tempco = x[es.GYRO_BIAS], x[es.GYRO_TEMPCO]
-        memory.acc_bias_x, memory.acc_bias_y = x[es.ACC_BIAS_X], x[es.ACC_BIAS_Y]
-        memory.acc_tempco_x, memory.acc_tempco_y = x[es.ACC_TEMPCO_X], x[es.ACC_TEMPCO_Y]
-        memory.gyro_gain = 1.0 - x[es.GYRO_SCALE]
-        memory.mxx, memory.mxy = 1.0 - x[es.ACC_MATRIX], x[es.ACC_MATRIX + 1]
-        memory.myx, memory.myy = x[es.ACC_MATRIX + 2], 1.0 - x[es.ACC_MATRIX + 3]
-        memory.lever_x, memory.lever_y = x[es.LEVER_X], x[es.LEVER_Y]
+    def _unpack(self, state: Array, moved: Array) -> None:
+        x = state.tolist()
         self._slope = x[es.SLOPE_X] + x[es.WAVE_X], x[es.SLOPE_Y] + x[es.WAVE_Y]
+        _pack_state(
+            self._buffer,
+            _Memory.gyro_bias.offset,
+            x[es.GYRO_BIAS],
+            x[es.GYRO_TEMPCO],
+            1.0 - x[es.GYRO_SCALE],
+            *x[es.ACC_BIAS_X : es.ACC_BIAS_Y + 1],
+            *x[es.ACC_TEMPCO_X : es.ACC_TEMPCO_Y + 1],
+            1.0 - x[es.ACC_MATRIX],
+            x[es.ACC_MATRIX + 1],
+            x[es.ACC_MATRIX + 2],
+            1.0 - x[es.ACC_MATRIX + 3],
+            *self._slope,
+            *x[es.LEVER_X : es.LEVER_Y + 1],
+            *moved.tolist(),
+        )
         self._warm(self._address)
         self._look_up()
 
     def _look_up(self) -> None:
-        memory = self._memory
-        memory.gx, memory.gy = self._slope
         if self._map is not None:
+            memory = self._memory
             known_x, known_y = self._map.at(memory.px, memory.py)
-            memory.gx += known_x
-            memory.gy += known_y
+            memory.gx, memory.gy = self._slope[0] + known_x, self._slope[1] + known_y
         self._is_stale = True
 
 

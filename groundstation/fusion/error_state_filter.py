@@ -18,10 +18,10 @@ from groundstation.core.library import Core, default_core
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
+from groundstation.fusion.carrier import Carrier
 from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
-from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
@@ -29,7 +29,6 @@ from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.past_fixes import Past, PastFixes
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace
-from groundstation.fusion.valve_knocks import add_knocks
 
 STEP_S = 1.0
 """Longest stretch over which the local slope is held; an outage is covered in several."""
@@ -37,7 +36,7 @@ REOPENED_VELOCITY_M_S = 0.1
 """Sigma of the velocity after the filter found itself lost: faster than anything flies on a table."""
 MAX_AHEAD_S = 1.0
 """A fix whose exposure is further ahead of the packets has a wrong stamp."""
-LOOK_S = 1.0
+LOOK_NS = 1_000_000_000
 """While no fix comes, how long the local slope is taken to be what it was."""
 WAITS = "waits for packets"
 CANDIDATE = "waits for a second fix"
@@ -73,9 +72,10 @@ class ErrorStateFilter:
         self.P = np.diag(es.initial_variance(noise))
         """(23 + 2m, 23 + 2m) covariance there."""
         self._surface = LearnedSurface.untouched(noise)
-        self._looked_s = 0.0
-        self._reckoner = make_reckoner(noise, self.counters, table_map, core or default_core())
-        self._lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
+        self._look_due_ns = 0
+        core = core or default_core()
+        self._reckoner = make_reckoner(noise, self.counters, table_map, core)
+        self._carrier = Carrier(noise, table_map, core)
         self._candidates: list[Fix] = []
         self._past = PastFixes()
         self._rests: list[tuple[float, float]] = []
@@ -109,7 +109,7 @@ class ErrorStateFilter:
             return None
         if self._waiting:
             self._retry()
-        if reckoner.newest_s > self._looked_s + LOOK_S:
+        if packet.t_ns > self._look_due_ns:
             self._integrate_to_now()
         return reckoner.report() if reckoner.has_pose else None
 
@@ -177,7 +177,8 @@ class ErrorStateFilter:
                 self._accounts.append(account)
 
     def _judge(self, fix: Fix) -> FixAccount:
-        if not np.isfinite([fix.x_m, fix.y_m, fix.heading_rad, *fix.cov.flat]).all():
+        said = (fix.x_m, fix.y_m, fix.heading_rad, *fix.cov.ravel().tolist())
+        if not all(map(math.isfinite, said)):
             return self._refuse(fix, "not finite")
         if max(abs(fix.x_m), abs(fix.y_m), abs(fix.heading_rad)) > MAX_PLAUSIBLE:
             return self._refuse(fix, "not on any table")
@@ -357,28 +358,27 @@ class ErrorStateFilter:
         """Return surface, state and covariance carried from the checkpoint `start_s` to `stop_s`."""
         surface, x, P = self._surface, self.x.copy(), self.P.copy()
         for a, b, resting in self._stretches(start_s, stop_s):
-            segment = self._reckoner.history.between(a, b)
             if resting:
                 rows = measurements.stand(x, P)
                 es.age(P, b - a, self.noise)
-            elif len(segment.span_s):
+            else:
                 surface, x, P, looked = look(surface, x, P, _ahead(x, 0.5 * (b - a)), self.noise)
-                flight = fly(x, segment, self._lag_difference_s, self._map)
-                rows = transition(segment, flight)
-                Q = moving_noise(segment, flight, self.noise)
-                add_knocks(Q, segment, flight, self.noise)
-                unseen = self._doubt.noise(a, b, float(x[es.THETA] + 0.5 * flight.turned[-1]))
-                es.move(P, rows, Q if unseen is None else Q + unseen)
-                x[: es.MOVING] = flight.moved
-                es.age(P, flight.duration_s, self.noise)
                 if steps is not None and self._trace is not None:
                     steps.append(looked)
-            else:
-                continue
+                flown = self._carrier.carry(x, self._reckoner.history, a, b)
+                if flown is None:
+                    continue
+                rows, Q = flown.rows, flown.noise
+                unseen = self._doubt.noise(a, b, float(x[es.THETA] + 0.5 * flown.turned_rad))
+                es.move(P, rows, Q if unseen is None else Q + unseen)
+                x[: es.MOVING] = flown.moved
+                es.age(P, flown.duration_s, self.noise)
             if steps is not None and self._trace is not None:
                 steps.append(Carried(b, rows, x[: es.SIZE].copy(), P[: es.SIZE].copy(), resting))
-            if resting and (learned := self._learn(x, P, segment)) is not None and steps is not None:
-                steps.append(learned)
+            if resting:
+                learned = self._learn(x, P, self._reckoner.history.between(a, b))
+                if learned is not None and steps is not None:
+                    steps.append(learned)
         return surface, x, P
 
     @property
@@ -424,15 +424,16 @@ class ErrorStateFilter:
         stretches = self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s)
         is_short = len(stretches) == 1  # then one look, in its middle and that of the second to come, will do
         for a, b, resting in stretches:
-            segment = self._reckoner.history.between(a, b)
             if resting:
                 x[es.VX : es.VY + 1] = 0.0
-            elif len(segment.span_s):
-                x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a + is_short * LOOK_S)))
-                x[: es.MOVING] = fly(x, segment, self._lag_difference_s, self._map).moved
+                continue
+            x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a + is_short * 1e-9 * LOOK_NS)))
+            moved = self._carrier.fly(x, self._reckoner.history, a, b)
+            if moved is not None:
+                x[: es.MOVING] = moved
         if not is_short:
-            x[here] = self._surface.slope(x, _ahead(x, 0.5 * LOOK_S))
-        self._looked_s = self._reckoner.newest_s
+            x[here] = self._surface.slope(x, _ahead(x, 0.5e-9 * LOOK_NS))
+        self._look_due_ns = self._reckoner.newest_ns + LOOK_NS
         self._reckoner.load(x[: es.SIZE], x[: es.MOVING])
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
         self._reckoner.variance = measurements.variance_in_time(self.x, self.P, noise)

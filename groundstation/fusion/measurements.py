@@ -64,7 +64,7 @@ def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) 
 def fix_covariance(fix: Fix, x: Array, omega_rad_s: float, noise: NoiseModel) -> Array:
     """Return the fix's covariance (3, 3) with what an exposure's uncertain stamp adds to a moving vehicle."""
     moved = np.array([x[es.VX], x[es.VY], omega_rad_s]) * noise.fix_time_sigma_s
-    return np.asarray(fix.cov + np.outer(moved, moved))
+    return np.asarray(fix.cov + moved[:, None] * moved)
 
 
 def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_sigma_m_s: float) -> None:
@@ -191,14 +191,14 @@ def variance_in_time(x: Array, P: Array, noise: NoiseModel) -> list[float]:
     a covariance would cost a hundred.
     """
     c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
-    L = np.zeros((6, es.SIZE))
-    L[[0, 1, 2, 3]] = reported(x, 0.0)[[0, 1, 3, 4]]
-    L[2:4] = 0.0
-    L[2, es.VX] = L[3, es.VY] = 1.0
-    L[4, es.ACC_BIAS_X], L[4, es.ACC_BIAS_Y] = -c, s
-    L[5, es.ACC_BIAS_X], L[5, es.ACC_BIAS_Y] = -s, -c
-    L[4, [es.SLOPE_X, es.WAVE_X]] = 1.0
-    L[5, [es.SLOPE_Y, es.WAVE_Y]] = 1.0
+    rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
+    L = np.zeros((6, es.SIZE))  # x and y: position of the centre of mass, velocity, constant acceleration
+    L[0, es.PX] = L[1, es.PY] = L[2, es.VX] = L[3, es.VY] = 1.0
+    L[0, es.THETA], L[1, es.THETA] = s * rx + c * ry, s * ry - c * rx
+    L[0, es.LEVER_X] = L[1, es.LEVER_Y] = L[4, es.ACC_BIAS_X] = L[5, es.ACC_BIAS_Y] = -c
+    L[0, es.LEVER_Y] = L[4, es.ACC_BIAS_Y] = s
+    L[1, es.LEVER_X] = L[5, es.ACC_BIAS_X] = -s
+    L[4, es.SLOPE_X] = L[4, es.WAVE_X] = L[5, es.SLOPE_Y] = L[5, es.WAVE_Y] = 1.0
     C = L @ P[: es.SIZE, : es.SIZE] @ L.T
     white = noise.acc_density_m_s2_rthz**2 / 3.0
     out: list[float] = []

@@ -20,9 +20,19 @@ WINDOW_S = 0.01
 """Shorter packets are looked at in groups as long: a valve takes some ms to open."""
 
 
+def group_of(noise: NoiseModel) -> int:
+    """Return how many packets are looked at together."""
+    return max(1, round(WINDOW_S / noise.packet_period_s))
+
+
+def step_of(noise: NoiseModel) -> float:
+    """Return the change of the mean force of a group, m/s^2, that only a valve makes."""
+    return STEP_SIGMAS * noise.acc_density_m_s2_rthz / math.sqrt(group_of(noise) * noise.packet_period_s)
+
+
 def add_knocks(Q: Array, segment: Segment, flight: Flight, noise: NoiseModel) -> None:
     """Add to the process covariance Q (5, 5), in place, one knock wherever the force changes abruptly."""
-    group = max(1, round(WINDOW_S / noise.packet_period_s))
+    group = group_of(noise)
     count = len(segment.span_s) // group
     if count < 2:
         return
@@ -30,8 +40,7 @@ def add_knocks(Q: Array, segment: Segment, flight: Flight, noise: NoiseModel) ->
     if group > 1:
         force = force[:, : count * group].reshape(2, count, group).mean(axis=2)
         until_end_s = until_end_s[: count * group : group]
-    white = STEP_SIGMAS * noise.acc_density_m_s2_rthz / math.sqrt(group * noise.packet_period_s)
-    left = until_end_s[1:][(np.abs(force[:, 1:] - force[:, :-1]) > white).any(axis=0)]
+    left = until_end_s[1:][(np.abs(force[:, 1:] - force[:, :-1]) > step_of(noise)).any(axis=0)]
     knock = noise.valve_knock_m_s**2
     vv, vp, pp = knock * len(left), knock * float(left.sum()), knock * float(left @ left)
     for v, p in ((VX, PX), (VY, PY)):
