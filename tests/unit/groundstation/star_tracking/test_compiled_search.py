@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibration.camera import StarCatalogue
-from groundstation.core.library import PURE, CoreError, load_core
+from groundstation.core.library import PURE
 from groundstation.star_tracking.compiled_search import STRUCTURES
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, StarFix
@@ -17,11 +17,8 @@ from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 
 @pytest.fixture(scope="module")
-def core():
-    try:
-        return load_core()
-    except CoreError as error:
-        pytest.skip(str(error))
+def core(compiled_core):
+    return compiled_core
 
 
 @pytest.fixture(scope="module")
