@@ -92,6 +92,7 @@ def _figure(width: float, height: float) -> Figure:
 def _cloud(axes: Axes, residual_px: Array, title: str) -> None:
     axes.plot(residual_px[:, 0], residual_px[:, 1], ".", markersize=2)
     axes.set(xlabel="u residual (px)", ylabel="v residual (px)", aspect="equal", title=title)
+    axes.locator_params(nbins=6)
     axes.grid(visible=True, alpha=0.3)
 
 

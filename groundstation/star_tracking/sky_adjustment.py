@@ -251,8 +251,8 @@ def _normal_equations(
     )
     error = (root[:, None] * (seen.pixel - pixel)).ravel()
     normal = (jacobian.T @ jacobian).toarray()
-    stars = g + pose.size + np.arange(star_m.size)
-    normal[stars, stars] += _HOLD_STD_M**-2  # a star whose sightings are all clipped stays where it is
+    held = g + np.arange(pose.size + star_m.size)
+    normal[held, held] += _HOLD_STD_M**-2  # what has no sighting left, all being clipped, stays
     gradient = jacobian.T @ error
     if known is not None:
         row = g + pose.size + 2 * known.star[:, None] + np.arange(2)
