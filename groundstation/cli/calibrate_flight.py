@@ -15,9 +15,13 @@ import numpy as np
 import typer
 
 from calibration.imu.result import CalibrationResult, Quantity, provenance_of
+from calibration.table.errors import TableMapError
 from groundstation.cli.errors import UsageError
+from groundstation.cli.flight_data import read_flight
 from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
+from groundstation.cli.fusion_folder import FusionFolder, write_atomically
+from groundstation.cli.table_map import map_of_sources
+from groundstation.cli.table_map_flights import read_source
 from groundstation.fusion.constants import CONSTANTS
 from groundstation.fusion.estimator import FixAccount
 from groundstation.fusion.noise import NoiseModel
@@ -56,18 +60,27 @@ def constants(smoother: OfflineSmoother) -> dict[str, Quantity]:
 
 
 def joint(
-    folder: Annotated[Path, typer.Argument(help="Folder with imu.csv, stars.csv and meta.json.")],
+    folder: Annotated[
+        Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, stars.csv and meta.json.")
+    ],
     out: OutOption,
     plot: PlotOption = None,
+    table_map: Annotated[
+        Path | None, typer.Option(help="TOML to write the slope's map to, with its sigmas.")
+    ] = None,
+    vehicle: Annotated[str | None, typer.Option(help="Of a recording with several vehicles.")] = None,
 ) -> None:
     """Re-estimate every constant of sensors, mounting, camera delay and slope from one recorded flight.
 
     A quantity that the flight did not excite keeps a wide sigma: turn for scale and lever arm, push along
-    both axes for the accelerometers' scales, warm up for the temperature slopes.
+    both axes for the accelerometers' scales, warm up for the temperature slopes. Turns give the lever arm of
+    the IMU. With --table-map the slope by place comes from the same flight, fitted together with its biases,
+    scales, lever arm and delay (`calibrate table-map` takes many flights and draws it).
 
     Example: groundstation calibrate joint samples/fusion/spin --out joint.toml --plot residuals.png
     """
-    data = read_folder(folder)
+    data = read_flight(folder, vehicle)
+    made = None if table_map is None else map_of_sources([read_source(folder, None, vehicle)])[1]
     noise = widened(data.noise)
     smoother = OfflineSmoother(noise)
     _, accounts = estimate(data, smoother)
@@ -88,6 +101,11 @@ def joint(
         },
         {"fixes": len(used), "fixes_refused": len(accounts) - len(used)},
     )
+    if made is not None and table_map is not None:
+        try:
+            made.save(table_map)
+        except TableMapError as error:
+            raise UsageError(f"{error}.") from None
     write_atomically({out: [result.to_toml()]})
     for name, quantity in quantities.items():
         print(f"{name} = {quantity.value:.6g} ± {quantity.std:.2g} {quantity.unit}")

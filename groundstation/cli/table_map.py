@@ -29,6 +29,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=N
 EDGE_M = 0.2
 """How far beyond the flown area a map reaches where no rig gives the table's edges."""
 NOISE_WARNING = 1.5
+SHORTEST_WAVE_M = 0.4
 PRIORS = FlightPriors()
 
 
@@ -44,7 +45,7 @@ def table_map(
     bounds: Annotated[
         str | None, typer.Option(help="Edges of the table in m: X_MIN,X_MAX,Y_MIN,Y_MAX.")
     ] = None,
-    shortest_wave_m: Annotated[float, typer.Option(help="Shorter waves are left out.")] = 0.4,
+    shortest_wave_m: Annotated[float, typer.Option(help="Shorter waves are left out.")] = SHORTEST_WAVE_M,
     check: Annotated[
         Path | None, typer.Option(help="A flight that is not learned from, to test the map on.")
     ] = None,
@@ -65,12 +66,7 @@ def table_map(
     sources = [read_source(path, rig, vehicle) for path in flights]
     logs = [log for source in sources for log in source.logs]
     legs = legs or next((dict(source.legs_m) for source in sources if source.legs_m), {})
-    basis = SurfaceBasis.over(given or _table_of(sources), shortest_wave_m)
-    try:
-        fit = fit_surface([flight_equations(log, basis, PRIORS) for log in logs], basis)
-    except ValueError as error:
-        raise UsageError(f"{error}.") from error
-    made = map_of(fit, _provenance(fit, sources))
+    fit, made = map_of_sources(sources, given, shortest_wave_m)
     advice = levelling(made.mean_m_s2, made.mean_cov_m2_s4, legs) if legs else None
     verdicts = _summary(fit, made, advice)
     if check is not None:
@@ -84,6 +80,23 @@ def table_map(
     except TableMapError as error:
         raise UsageError(f"{error}.") from error
     print("\n".join(verdicts))
+
+
+def map_of_sources(
+    sources: list[Source], bounds_m: Bounds | None = None, shortest_wave_m: float = SHORTEST_WAVE_M
+) -> tuple[SurfaceFit, TableMap]:
+    """Fit the table's surface, with every constant of each flight, and lay it on a grid.
+
+    Raises:
+        UsageError: the flights do not suffice.
+    """
+    basis = SurfaceBasis.over(bounds_m or _table_of(sources), shortest_wave_m)
+    logs = [log for source in sources for log in source.logs]
+    try:
+        fit = fit_surface([flight_equations(log, basis, PRIORS) for log in logs], basis)
+    except ValueError as error:
+        raise UsageError(f"{error}.") from error
+    return fit, map_of(fit, _provenance(fit, sources))
 
 
 def _summary(fit: SurfaceFit, made: TableMap, advice: Levelling | None) -> list[str]:
