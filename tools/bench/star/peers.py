@@ -21,6 +21,9 @@ PICTURES = 60
 """Of each kind at most."""
 SLOW_PICTURES = 5
 """Of each kind for astroalign, which takes half a second for one, and minutes for some without a ceiling."""
+SQUARE_PICTURES = 30
+"""Of each kind that squares are drawn for."""
+SHARP = ("easy", "edge")
 FOUND = ("easy", "blur", "edge", "false-lights", "leds-out", "mixed", "sparse")
 COMPARED = ("easy", "edge", "blur")
 OURS, BESIDE = "ours", "beside:"
@@ -48,16 +51,16 @@ def measure(bench: Bench) -> list[Row]:
     rows[:0] = _own(ours)
     for name, score in scores.items():
         rows += _beside(name, score, ours)
-    few = [frame for tag in COMPARED for frame in _first(frames, tag)]
+    few = _first(frames, COMPARED, SLOW_PICTURES)
     slow, missing = _made({OURS: makers[OURS], "astroalign": lambda: Astroalign(catalogue, camera).solve})
     slow_scores = run_beside(few, slow, bench.say)
     if "astroalign" in slow_scores:
         rows += _beside("astroalign", slow_scores["astroalign"], slow_scores[OURS])
     rows += missing
-    square_frames = [frame for frame in frames if frame.tag in ("easy", "edge")][:: 1 + PICTURES // 20]
-    mine = run_beside(square_frames, {OURS: solvers[OURS]})[OURS]
+    sharp = _first(frames, SHARP, SQUARE_PICTURES)
+    mine = run_beside(sharp, {OURS: solvers[OURS]})[OURS]
     for name in KINDS:
-        score = SquareCeiling(name, camera, catalogue).score(square_frames, bench.say)
+        score = SquareCeiling(name, camera, catalogue).score(sharp, bench.say)
         rows += _beside(f"{name} squares for LEDs", score, mine)
     return rows
 
@@ -81,8 +84,9 @@ def _warm(frames: Sequence[Frame], solvers: dict[str, Solver]) -> None:
             solve(spots)
 
 
-def _first(frames: Sequence[Frame], tag: str) -> list[Frame]:
-    return [frame for frame in frames if frame.tag == tag][:SLOW_PICTURES]
+def _first(frames: Sequence[Frame], tags: Sequence[str], count: int) -> list[Frame]:
+    """So many of each kind."""
+    return [frame for tag in tags for frame in [f for f in frames if f.tag == tag][:count]]
 
 
 def _own(ours: Score) -> list[Row]:

@@ -19,6 +19,8 @@ KINDS = {"ArUco 4x4": cv2.aruco.DICT_4X4_50, "AprilTag 36h11": cv2.aruco.DICT_AP
 SQUARE_M, PITCH_M, COLUMNS, COUNT = 0.15, 0.6, 8, 48
 INK_DN, PAPER_DN, NOISE_DN, BLUR_PX = 20.0, 170.0, 2.0, 0.7
 _FINE = 3
+"""Drawn so many times finer than the camera sees."""
+TILE_PX = 120
 
 
 class SquareCeiling:
@@ -33,6 +35,12 @@ class SquareCeiling:
         x, y = float(catalogue.x_m.min()), float(catalogue.y_m.min())
         number = np.arange(COUNT)
         self._centre = np.column_stack((number % COLUMNS, number // COLUMNS)) * PITCH_M + (x + 0.2, y + 0.2)
+        self._tiles = np.stack(
+            [cv2.aruco.generateImageMarker(self._dictionary, n, TILE_PX) for n in number.tolist()]
+        )
+        v, u = np.indices((camera.height * _FINE, camera.width * _FINE), dtype=float)
+        u, v = (u.ravel() + 0.5) / _FINE - 0.5, (v.ravel() + 0.5) / _FINE - 0.5
+        self._fine_m, _ = ceiling_points(camera, u, v)
         half = 0.5 * SQUARE_M
         self._corner = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
 
@@ -48,24 +56,22 @@ class SquareCeiling:
             score.take(frame, answer, unit, 0.0, 1e3 * (time.process_time() - begin))
         return score
 
+    def _nearest(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Number of the square nearest to each point of the ceiling."""
+        column, row = np.rint((np.stack((x_m, y_m)) - self._centre[0][:, None]) / PITCH_M).astype(np.int64)
+        return np.clip(row, 0, COUNT // COLUMNS - 1) * COLUMNS + np.clip(column, 0, COLUMNS - 1)
+
     def _draw(self, pose: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.uint8]:
-        height, width = self._camera.height, self._camera.width
-        v, u = np.indices((height * _FINE, width * _FINE), dtype=float)
-        u, v = (u.ravel() + 0.5) / _FINE - 0.5, (v.ravel() + 0.5) / _FINE - 0.5
-        q, _ = ceiling_points(self._camera, u, v)
+        height, width, q = self._camera.height, self._camera.width, self._fine_m
         c, s = np.cos(pose[2]), np.sin(pose[2])
         x = pose[0] + c * q[:, 0] - s * q[:, 1]
         y = pose[1] + s * q[:, 0] + c * q[:, 1]
+        number = self._nearest(x, y)
+        dx, dy = x - self._centre[number, 0], y - self._centre[number, 1]
+        on = np.flatnonzero((np.abs(dx) < 0.5 * SQUARE_M) & (np.abs(dy) < 0.5 * SQUARE_M))
+        column, row = (((d[on] / SQUARE_M + 0.5) * TILE_PX).astype(int) for d in (dx, dy))
         picture = np.full(len(x), PAPER_DN)
-        for number, centre in enumerate(self._centre):
-            dx, dy = x - centre[0], y - centre[1]
-            mine = (np.abs(dx) < 0.5 * SQUARE_M) & (np.abs(dy) < 0.5 * SQUARE_M)
-            if not mine.any():
-                continue
-            tile = cv2.aruco.generateImageMarker(self._dictionary, number, 120)
-            column = ((dx[mine] / SQUARE_M + 0.5) * 119.99).astype(int)
-            row = ((dy[mine] / SQUARE_M + 0.5) * 119.99).astype(int)
-            picture[mine] = INK_DN + (PAPER_DN - INK_DN) / 255.0 * tile[row, column]
+        picture[on] = INK_DN + (PAPER_DN - INK_DN) / 255.0 * self._tiles[number[on], row, column]
         fine = picture.reshape(height * _FINE, width * _FINE)
         small = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
         image = cv2.GaussianBlur(small, (0, 0), BLUR_PX) + rng.normal(0.0, NOISE_DN, small.shape)
