@@ -140,6 +140,39 @@ def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(ceiling_folder, tmp
         assert [row["fix"] for row in csv.DictReader(file)] == ["1"] * 8
 
 
+def test_black_and_saturated_frames_are_answered_with_their_reasons(ceiling_folder, tmp_path):
+    folder = copy_of(ceiling_folder, tmp_path)
+    cv2.imwrite(str(folder / "frames" / "00001.png"), np.full((480, 640), 255, np.uint8))
+    call("solve", folder, "--out", folder / "answers.csv")
+    with (folder / "answers.csv").open(newline="") as file:
+        reasons = [row["reason"] for row in csv.DictReader(file)]
+    assert reasons == ["", "picture flooded with light", "no light spots"]
+
+
+@pytest.mark.parametrize(
+    ("file", "edit", "words"),
+    [
+        ("ceiling.csv", lambda text: text + "5,3.0,3.0\n", "'5' appears twice"),
+        ("ceiling.csv", lambda text: text + "900,nan,3.0\n", "x_m is 'nan'"),
+        ("ceiling.csv", lambda text: "\n".join(text.splitlines()[:4]) + "\n", "at least 4 stars"),
+        ("camera.json", lambda text: text.replace('"fx"', '"focal"'), "'fx' is missing"),
+        ("camera.json", lambda text: text[:40], "camera.json"),
+    ],
+    ids=["star twice", "NaN", "three stars", "missing key", "torn"],
+)
+@pytest.mark.parametrize("command", ["solve", "intrinsics", "mount"])
+def test_a_wrong_sky_is_refused_in_one_sentence_by_every_command(
+    ceiling_folder, tmp_path, command, file, edit, words
+):
+    folder = copy_of(ceiling_folder, tmp_path)
+    path = folder / file
+    path.write_text(edit(path.read_text()))
+    with pytest.raises(UsageError, match=words) as refusal:
+        call(command, folder, "--out", folder / "out.toml")
+    assert "\n" not in str(refusal.value)
+    assert not (folder / "out.toml").exists()
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
