@@ -16,6 +16,8 @@ LAP_M = ((0.0, 0.0), (1.5, 0.0), (1.5, 1.08), (0.0, 1.08))
 """Corners of a lap, from the start."""
 LAP_SPEED_M_S = 0.0645
 LAP_TURN_S = 6.3
+ROUND_S = 1.6
+"""Before and after a corner in which the speed goes over from one leg to the next."""
 SETTLE_S = 5.0
 """A lap's goal sets out gently."""
 
@@ -98,7 +100,7 @@ def goal_at(lab: Laboratory, t: float, start: Array) -> tuple[Array, Array]:
 
 
 def _lap(t: float, start: Array) -> tuple[Array, Array]:
-    """Return pose and rate on laps around a rectangle, the heading turning with the corners."""
+    """Return pose and rate on laps around a rectangle, corners rounded, the heading turning after them."""
     corners = np.array(LAP_M)
     gently = math.exp(-t / SETTLE_S)
     along = LAP_SPEED_M_S * (t - SETTLE_S * (1.0 - gently))
@@ -107,16 +109,28 @@ def _lap(t: float, start: Array) -> tuple[Array, Array]:
     while along > _leg_m(corners, leg):
         along -= _leg_m(corners, leg)
         leg += 1
-    way = (corners[(leg + 1) % 4] - corners[leg % 4]) / _leg_m(corners, leg)
+    since, until = along / LAP_SPEED_M_S, (_leg_m(corners, leg) - along) / LAP_SPEED_M_S
+    place, v = corners[leg % 4] + _way(corners, leg) * along, _way(corners, leg) * speed
+    if until < ROUND_S or (leg > 0 and since < ROUND_S):
+        entered = leg - (until >= ROUND_S)
+        s = -until if until < ROUND_S else since
+        v_in, v_out = _way(corners, entered) * speed, _way(corners, entered + 1) * speed
+        place = corners[(entered + 1) % 4] + (v_out * (ROUND_S + s) ** 2 - v_in * (ROUND_S - s) ** 2) / (
+            4.0 * ROUND_S
+        )
+        v = (v_in * (ROUND_S - s) + v_out * (ROUND_S + s)) / (2.0 * ROUND_S)
     turned, rate = float(leg), 0.0
-    since = along / LAP_SPEED_M_S / LAP_TURN_S
-    if leg > 0 and since < 1.0:
-        turned = leg - 1 + since**2 * (3.0 - 2.0 * since)
-        rate = 6.0 * since * (1.0 - since) / LAP_TURN_S
+    share = since / LAP_TURN_S
+    if leg > 0 and share < 1.0:
+        turned = leg - 1 + share**2 * (3.0 - 2.0 * share)
+        rate = 6.0 * share * (1.0 - share) / LAP_TURN_S
     quarter = math.pi / 2.0
-    pose = np.array([*(start[:2] + corners[leg % 4] + way * along), start[2] + turned * quarter])
-    return pose, np.array([*(way * speed), rate * quarter])
+    return np.array([*(start[:2] + place), start[2] + turned * quarter]), np.array([*v, rate * quarter])
 
 
 def _leg_m(corners: Array, leg: int) -> float:
     return float(np.hypot(*(corners[(leg + 1) % 4] - corners[leg % 4])))
+
+
+def _way(corners: Array, leg: int) -> Array:
+    return np.asarray((corners[(leg + 1) % 4] - corners[leg % 4]) / _leg_m(corners, leg))

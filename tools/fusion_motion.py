@@ -62,7 +62,7 @@ def fly(lab: Laboratory, rng: np.random.Generator, table: Table) -> dict[str, Ar
             pose, rate = goal_at(lab, t, start)
             seen_p = p + rng.normal(0.0, 1.5e-3, 2)
             seen_v = v + rng.normal(0.0, 1.0e-3, 2)
-            wanted_v += np.clip(rate[:2] - wanted_v, -0.004, 0.004)
+            wanted_v += np.clip(rate[:2] - wanted_v, -0.006, 0.006)
             a = np.clip(0.05 * (pose[:2] - seen_p) + 0.5 * (wanted_v - seen_v), -0.03, 0.03)
             c, s = math.cos(theta), math.sin(theta)
             body = mass * np.array([c * a[0] + s * a[1], -s * a[0] + c * a[1]])
