@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
 from calibration.camera.board import Board
+from groundstation.cli.delay_source import Turns, turns_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import check_targets, find_frames, read_frame, with_progress
 from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
@@ -24,6 +25,7 @@ Folder = Annotated[Path, typer.Argument(help="With camera.json, ceiling.csv and 
 Out = Annotated[Path, typer.Option(help="Result with provenance to write (TOML).")]
 CameraOut = Annotated[Path | None, typer.Option(help="camera.json to write with the new values.")]
 Plot = Annotated[Path | None, typer.Option(help="Residual plot to write (PNG).")]
+_GUESS_S = 0.05
 
 
 def intrinsics(
@@ -115,25 +117,40 @@ def board(
 
 
 def delay(
-    folder: Annotated[Path, typer.Argument(help="With imu.csv and stars.csv of one recording.")],
+    source: Annotated[Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv and stars.csv.")],
     out: Out,
-    guess_s: Annotated[float, typer.Option(help="First guess of the delay.")] = 0.05,
+    guess_s: Annotated[
+        float | None, typer.Option(help="First guess of the delay; default: the rig's, or 0.05.")
+    ] = None,
+    vehicle: Annotated[str | None, typer.Option(help="Whose, if the recording holds several.")] = None,
     plot: Plot = None,
 ) -> None:
     """Calibrate the camera's delay by laying star headings on the integrated turn rate.
 
-    imu.csv needs t_s,omega_rad_s; stars.csv t_arrival_s,heading_rad. The mock-up must turn to and fro.
+    The mock-up must turn to and fro. imu.csv needs t_s,omega_rad_s; stars.csv t_arrival_s,heading_rad.
     The rig reads the result: delay_file = "delay.toml" in its star_camera section.
 
     Example:
-      groundstation star-tracker delay recordings/wiggle --out delay.toml
+      groundstation star-tracker delay recordings/wiggle.mcap --out delay.toml
     """
     check_targets(out, plot)
-    gyro = _columns(folder / "imu.csv", ("t_s", "omega_rad_s"))
-    stars = _columns(folder / "stars.csv", ("t_arrival_s", "heading_rad"))
-    with refusing(folder), progress_line() as progress:
-        found = delay_from_headings(*gyro, *stars, guess_s=guess_s, progress=progress)
-    write_outcome(folder, found, [folder / "imu.csv", folder / "stars.csv"], out, None, plot)
+    if source.is_dir():
+        files = [source / "imu.csv", source / "stars.csv"]
+        gyro = _columns(files[0], ("t_s", "omega_rad_s"))
+        stars = _columns(files[1], ("t_arrival_s", "heading_rad"))
+        turns = Turns(*gyro, *stars, _GUESS_S)
+    else:
+        files, turns = [source], turns_of(source, vehicle)
+    with refusing(source), progress_line() as progress:
+        found = delay_from_headings(
+            turns.gyro_t_s,
+            turns.rate_rad_s,
+            turns.arrival_t_s,
+            turns.heading_rad,
+            guess_s=turns.guess_s if guess_s is None else guess_s,
+            progress=progress,
+        )
+    write_outcome(source, found, files, out, None, plot)
 
 
 def _pictures(folder: Path) -> tuple[CameraCalibration, StarCatalogue, list[Spots]]:
