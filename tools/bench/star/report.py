@@ -37,8 +37,11 @@ def rows_of(score: Score, what: str) -> list[Row]:
     ):
         for kind in kinds:
             row = f"{what}: {name} RMS, {kind}"
-            limit = limits.get(kind)
-            rows.append(at_most(row, found(kind), *limit, unit) if limit else plain(row, found(kind), unit))
+            limit, figure = limits.get(kind), found(kind)
+            if limit is not None:
+                rows.append(at_most(row, figure, *limit, unit))
+            elif np.isfinite(figure):
+                rows.append(plain(row, figure, unit))
     if score.chi2:
         chi2 = float(np.mean(score.chi2))
         rows.append(between(f"{what}: squared errors over reported covariance, by 3", chi2, 0.5, 2.0))
