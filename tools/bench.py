@@ -22,7 +22,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy loads: figures are per core
 
 import cv2  # noqa: E402
-from bench import fresh_clone, live, lockstep_speed, parser, station_keeping  # noqa: E402
+from bench import fresh_clone, live, lockstep_speed, many_mock_ups, parser, station_keeping  # noqa: E402
 from bench import table as bench_table  # noqa: E402
 from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
 from bench.fusion import folder as fusion_folder  # noqa: E402
@@ -43,6 +43,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
         "parser": parser.measure,
+        "many_mock_ups": many_mock_ups.measure,
         "star": star_frames.measure,
         "star_lights": star_lights.measure,
         "star_sky": star_sky.measure,
@@ -56,7 +57,9 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     }
 )
 """THE TABLE of subjects, in the order of the page."""
-ON_REQUEST = frozenset({"fresh_clone", "star_folder", "fusion_folder"})
+FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
+"""Subjects of recorded data, and what their folder must hold."""
+ON_REQUEST = frozenset({"fresh_clone", *FOLDERS})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:
@@ -102,9 +105,9 @@ def main() -> None:
     words.add_argument("--folder", type=Path, help="data with truth, for star_folder and fusion_folder")
     words.add_argument("--write", type=Path, metavar="PAGE", help="put the tables into this Markdown page")
     arguments = words.parse_args()
-    named = {"star_folder", "fusion_folder"} & set(arguments.only or ())
-    if named and (arguments.folder is None or not arguments.folder.is_dir()):
-        words.error(f"{' and '.join(sorted(named))} needs --folder with a data set and its truth.csv")
+    for name, pattern in FOLDERS.items():
+        if name in (arguments.only or ()) and not (arguments.folder and any(arguments.folder.glob(pattern))):
+            words.error(f"{name} needs --folder with a data set: truth.csv beside {Path(pattern).name}")
     cv2.setNumThreads(1)
     rows = run(arguments)
     sys.exit(1 if any(row.ok is False for row in rows) else 0)

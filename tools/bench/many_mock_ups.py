@@ -10,7 +10,8 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
-from bench.rows import RIGS
+from bench.limits import at_most
+from bench.rows import RIGS, Bench, Row
 from groundstation.bus.envelope import Delivered
 from groundstation.bus.topics import Scope
 from groundstation.messages.base import Message
@@ -24,6 +25,12 @@ from groundstation.runtime.rig import Rig, load_rig, parse_rig
 
 ORIGINAL = "alpha"
 NODES = ("imu_reader", "fusion")
+CASES = ((20, 4), (5, 1))
+"""Mock-ups, polls of 1 kHz per IMU frame."""
+FLOWN_S = 16.0
+REPEATS = 3
+MUST = 1.0
+"""CPU seconds per second flown: real time on one core."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +42,24 @@ class Replayed:
     samples: int
     is_same: bool
     """Whether every payload came out as recorded."""
+
+
+def measure(bench: Bench) -> list[Row]:
+    """Bytes to IMU reader to fusion with late fixes, every payload compared with the recording."""
+    rows = []
+    for count, averaging in CASES:
+        what = (
+            f"replay of {count} mock-ups at {1000 // averaging} samples/s in one process: CPU s per s flown"
+        )
+        bench.say(what)
+        recording = bench.folder / f"{count}_mock_ups.mcap"
+        names = multiply(fly(bench.folder, averaging, FLOWN_S), recording, count)
+        found = [replay(recording, names) for _ in range(REPEATS)]
+        middle = sorted(each.cpu_s_per_s for each in found)[REPEATS // 2]
+        row = at_most(what, middle, MUST, note=f"{bench.in_units(middle)}, {found[0].samples} samples")
+        same = all(each.is_same for each in found)
+        rows.append(row if same else Row(what, row.limit, "the replay differs from the recording", ok=False))
+    return rows
 
 
 def fly(folder: Path, averaging: int, flown_s: float) -> Path:
