@@ -184,7 +184,7 @@ class ErrorStateFilter:
             return self._refuse(fix, "not on any table")
         reckoner = self._reckoner
         t = self._seconds(fix.t_exposure_ns)
-        if reckoner.origin_ns is None or (len(reckoner.history) and t < reckoner.history.first_s):
+        if not len(reckoner.history) or t < reckoner.history.first_s:
             return self._refuse(fix, "before the first packet")
         if t > reckoner.newest_s + 1e-9:
             if t > reckoner.newest_s + MAX_AHEAD_S:

