@@ -22,7 +22,9 @@ LABELS = (
     "estimate, rms by truth",
     "IMU",
     "star fixes",
+    "  innovation, NIS",
     "  refused",
+    "  not used",
     "tank",
 )
 
@@ -44,7 +46,9 @@ def rows_of(vehicle: VehicleMonitor, now_ns: int) -> list[Text]:
         _pair(vehicle.estimate_errors.rms()),
         _imu(vehicle, now_ns),
         _fixes(vehicle, now_ns),
+        _innovation(vehicle),
         _refused(vehicle),
+        _counts(vehicle.unused, Text(overflow="ellipsis")) if vehicle.unused else _NOTHING,
         _tank(vehicle),
     ]
 
@@ -176,8 +180,26 @@ def _refused(vehicle: VehicleMonitor) -> Text:
     text = Text(overflow="ellipsis")
     if fix is not None and not fix.fix:
         text.append("now: ", style=_BAD).append(fix.reason.partition(":")[0], style=_BAD).append("; ")
-    counts = sorted(vehicle.refused.items(), key=lambda item: -item[1])
+    return _counts(vehicle.refused, text)
+
+
+def _counts(by_reason: dict[str, int], text: Text) -> Text:
+    counts = sorted(by_reason.items(), key=lambda item: -item[1])
     return text.append(", ".join(f"{count} x {reason}" for reason, count in counts), style=_DIM)
+
+
+def _innovation(vehicle: VehicleMonitor) -> Text:
+    """How far the newest fix lay from what was expected, and the mean NIS of the last ones (3 expected)."""
+    account = _newest(vehicle, m.FixAccount)
+    if account is None or math.isnan(account.nis):
+        return _NOTHING
+    x, y, turn = account.innovation
+    style = "" if account.used else _BAD
+    text = Text(f"{math.hypot(x, y) * 1e3:8.2f} mm {math.degrees(turn):8.3f} deg", style=style)
+    text.append(f"  {account.nis:.1f}")
+    if vehicle.nis:
+        text.append(f", mean {sum(vehicle.nis) / len(vehicle.nis):.1f} of 3", style=_DIM)
+    return text
 
 
 def _tank(vehicle: VehicleMonitor) -> Text:

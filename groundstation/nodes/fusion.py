@@ -31,6 +31,8 @@ from groundstation.nodes.node import Node
 STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
 DIAGNOSTICS_EVERY = 5
+LONGEST_WAIT_NS = 1_000_000_000
+NO_PACKETS = "no packets come"
 SOURCES: Mapping[type[Message], str] = MappingProxyType({StarFix: "stars", OverheadFix: "overhead"})
 """Messages that bring fixes, and the rig's word for who says them."""
 NO_FILES: Mapping[str, tuple[str, str]] = MappingProxyType({})
@@ -77,6 +79,7 @@ class Fusion(Node):
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
+        self._waiting: dict[tuple[int, str], tuple[int, Account]] = {}
 
     def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
         source = SOURCES.get(payload)
@@ -103,6 +106,7 @@ class Fusion(Node):
                 self._hear_float(now_ns, floating=True)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
+        yield from self._overdue(now_ns)
         state = self._state
         age_s = (now_ns - self._fix_stamp_ns) * 1e-9 if self._fix_stamp_ns else math.inf
         biases = (
@@ -157,10 +161,19 @@ class Fusion(Node):
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
         )
-        if account.reason != WAITS:  # it is accounted for when the packets up to its exposure are here
+        if account.reason == WAITS:  # it is accounted for when the packets up to its exposure are here
+            self._waiting[account.t_exposure_ns, account.source] = now_ns, account
+        else:
             yield self._account(account, now_ns)
 
+    def _overdue(self, now_ns: int) -> Iterator[FixAccount]:
+        """Name the fixes whose packets do not come; should they come after all, a second account follows."""
+        for arrived_ns, account in tuple(self._waiting.values()):
+            if now_ns - arrived_ns > LONGEST_WAIT_NS:
+                yield self._account(account._replace(reason=NO_PACKETS), now_ns)
+
     def _account(self, account: Account, now_ns: int) -> FixAccount:
+        self._waiting.pop((account.t_exposure_ns, account.source), None)
         self._used += account.used
         self._refused += not account.used
         if account.used:

@@ -1,6 +1,7 @@
 """Figures of the report. Each takes the tracks and a path, and leaves a PNG."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -88,6 +89,42 @@ def draw_valves(tracks: Mapping[str, Track], path: Path) -> None:
         axes.grid(alpha=0.3)
     panels[0].set_title("Open valves")
     panels[-1].set_xlabel("t, s")
+    figure.savefig(path, dpi=DPI)
+
+
+def draw_fixes(tracks: Mapping[str, Track], path: Path) -> None:
+    """What became of every fix: innovations and NIS of the used ones, crosses for those that were not."""
+    figure = Figure(figsize=(10, 3 * 4), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True)
+    labels = ("innovation x, mm", "innovation y, mm", "innovation heading, deg", "NIS")
+    scales = (1e3, 1e3, 180.0 / math.pi, 1.0)
+    largest = np.full(4, 1e-3)
+    for track in tracks.values():
+        used = track.accounts[track.accounts[:, 1] == 1.0, 2:]
+        if np.isfinite(used).any():
+            largest = np.fmax(largest, 1.3 * np.nanmax(np.abs(used), axis=0) * scales)
+    for colour, (name, track) in zip(_cycle(), tracks.items(), strict=False):
+        t, is_used = track.accounts[:, 0], track.accounts[:, 1] == 1.0
+        unused = Counter(
+            reason for reason, used in zip(track.account_reasons, is_used, strict=True) if not used
+        )
+        words = "".join(f"; {count} {reason}" for reason, count in unused.most_common(4))
+        for k, axes in enumerate(panels):
+            # what has no innovation was never compared: it is marked on the edge
+            values = np.nan_to_num(track.accounts[:, 2 + k] * scales[k], nan=largest[k])
+            shown = np.clip(values, -largest[k], largest[k])
+            compared = is_used & np.isfinite(track.accounts[:, 2 + k])
+            label = f"{name}: {is_used.sum()} used{words}" if k == 0 else None
+            axes.plot(t[compared], shown[compared], ".", color=colour, ms=4, label=label)
+            axes.plot(t[~is_used], shown[~is_used], "x", color=colour, ms=6)
+    for axes, label in zip(panels, labels, strict=True):
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    panels[3].axhline(3.0, color="black", lw=0.8, ls=":", label="expected mean of used fixes")
+    panels[3].set_ylim(bottom=0.0)
+    panels[0].set_title("Every fix against the filter: used (dots), not used (crosses, cut to the frame)")
+    figure.legend(loc="outside lower center")
+    panels[-1].set_xlabel("exposure, s")
     figure.savefig(path, dpi=DPI)
 
 

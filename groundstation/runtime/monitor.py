@@ -17,6 +17,7 @@ from groundstation.runtime import ledger
 ERROR_WINDOW_S = 30.0
 RATE_WINDOW_S = 3.0
 LINES_KEPT = 8
+NIS_KEPT = 30
 
 
 @dataclass(slots=True)
@@ -72,6 +73,10 @@ class VehicleMonitor:
     """Truth against goal."""
     refused: dict[str, int] = field(default_factory=dict)
     """Fixes refused, by the kind of reason (what stands before the colon)."""
+    unused: dict[str, int] = field(default_factory=dict)
+    """Fixes that fusion did not use, by reason."""
+    nis: deque[float] = field(default_factory=lambda: deque(maxlen=NIS_KEPT))
+    """Normalised innovations squared of the newest used fixes."""
 
     def rate_hz(self, payload: type[Message], now_ns: int) -> float:
         """Messages per second of a topic."""
@@ -131,6 +136,11 @@ class Monitor:
             vehicle.rates.setdefault(kind, Rate()).count(now_ns)
         if isinstance(payload, m.ReferenceState):
             self._compare(vehicle, payload, now_ns)
+        elif isinstance(payload, m.FixAccount):
+            if not payload.used:
+                vehicle.unused[payload.reason] = vehicle.unused.get(payload.reason, 0) + 1
+            elif math.isfinite(payload.nis):
+                vehicle.nis.append(payload.nis)
         elif isinstance(payload, m.StarFix) and not payload.fix:
             kind_of_refusal = payload.reason.partition(":")[0]
             vehicle.refused[kind_of_refusal] = vehicle.refused.get(kind_of_refusal, 0) + 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from groundstation.messages import definitions as m
 from groundstation.recording.reader import Recording
 from groundstation.runtime.errors import UsageError
-from groundstation.runtime.figures import draw_errors, draw_latency, draw_table, draw_valves
+from groundstation.runtime.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
 from groundstation.runtime.tracks import Track, estimate_errors, read_tracks, station_errors
 
 SETTLING_S = 20.0
@@ -39,6 +39,7 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         "table.png": draw_table,
         "errors.png": draw_errors,
         "valves.png": draw_valves,
+        "fixes.png": draw_fixes,
         "latency.png": draw_latency,
     }
     written = []
@@ -63,6 +64,7 @@ def summarise(track: Track) -> dict[str, Any]:
     settled = station[station[:, 0] >= track.flying_since_s + SETTLING_S]
     flown = estimate[estimate[:, 0] >= track.flying_since_s + SETTLING_S]
     latency = track.latency
+    used = track.accounts[(track.accounts[:, 1] == 1.0) & np.isfinite(track.accounts[:, 5])]
     return {
         "flying_since_s": track.flying_since_s,
         "settled_for_s": float(np.ptp(settled[:, 0])) if len(settled) else 0.0,
@@ -74,6 +76,9 @@ def summarise(track: Track) -> dict[str, Any]:
         "imu_frames": track.imu_frames,
         "imu_frames_lost": track.frames_lost,
         "fixes": track.fixes,
+        "fix_innovation_position_rms_mm": _rms(np.hypot(used[:, 2], used[:, 3])) * 1e3,
+        "fix_innovation_heading_rms_deg": math.degrees(_rms(used[:, 4])),
+        "fix_nis_mean": float(used[:, 5].mean()) if len(used) else math.nan,
         "latency_p50_ms": {} if latency is None else _stages(latency, latency.p50_s),
         "latency_p99_ms": {} if latency is None else _stages(latency, latency.p99_s),
     }

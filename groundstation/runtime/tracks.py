@@ -34,6 +34,8 @@ class Track:
         open_masks: Rows of t, open mask; shape (n, 2).
         flying_since_s: When the start sequence said so; NaN if never.
         fixes: Counts of fixes used and refused, by reason.
+        accounts: Rows of t, used (1 or 0), innovation x, y (m), heading (rad), NIS; shape (n, 6).
+        account_reasons: What was said of each row.
         latency: The newest summary.
         frames_lost: IMU frames missing at the end.
         imu_frames: IMU samples seen.
@@ -43,6 +45,8 @@ class Track:
     state: Array
     goal: Array
     open_masks: Array
+    accounts: Array = field(default_factory=lambda: np.empty((0, 6)))
+    account_reasons: list[str] = field(default_factory=list)
     flying_since_s: float = math.nan
     fixes: dict[str, int] = field(default_factory=dict)
     latency: m.Latency | None = None
@@ -60,7 +64,7 @@ def read_tracks(source: Recording) -> dict[str, Track]:
         name = payload.vehicle
         if name not in tracks:
             tracks[name] = Track(np.empty((0, 7)), np.empty((0, 7)), np.empty((0, 4)), np.empty((0, 2)))
-            rows[name] = {"truth": [], "state": [], "goal": [], "open_masks": []}
+            rows[name] = {"truth": [], "state": [], "goal": [], "open_masks": [], "accounts": []}
         track, row = tracks[name], rows[name]
         t_s = (payload.stamp_ns - start_ns) * 1e-9
         match payload:
@@ -85,6 +89,8 @@ def read_tracks(source: Recording) -> dict[str, Track]:
             case m.FixAccount():
                 reason = "used" if payload.used else payload.reason
                 track.fixes[reason] = track.fixes.get(reason, 0) + 1
+                track.account_reasons.append(payload.reason)
+                row["accounts"].append((t_s, float(payload.used), *payload.innovation, payload.nis))
             case m.Latency():
                 track.latency = payload
             case m.Imu():

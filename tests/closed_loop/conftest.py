@@ -19,6 +19,7 @@ class Flight:
     def __init__(self, text, seed):
         self.said = defaultdict(list)
         self.stamps_ns = defaultdict(list)
+        self.rigs = RIGS
         self.rig = parse_rig(text, RIGS / "test.toml")
         self.runner = make_runner(self.rig, seed, [self._keep])
 

@@ -52,7 +52,7 @@ def test_a_duration_ends_by_itself_and_leaves_a_report(launch, two_drawn):
     run = launch(two_drawn, "--duration", "5", "--report", str(two_drawn.parent / "report"))
     assert run.process.wait(60) == 0
     assert sorted(path.name for path in (two_drawn.parent / "report").iterdir()) == [
-        "errors.png", "latency.png", "report.json", "table.png", "valves.png",
+        "errors.png", "fixes.png", "latency.png", "report.json", "table.png", "valves.png",
     ]  # fmt: skip
 
 
