@@ -1,7 +1,8 @@
 """Delay of the camera against the IMU: where integrated turn rate and star headings agree best.
 
 A heading that arrived at ``t`` was true at ``t - delay``. With G the integral of the gyro's rate the
-model is ``heading = G(t - delay) + offset + bias t``; delay, offset and gyro bias are least squares.
+model is ``heading = scale G(t - delay) + offset + bias t``; delay, offset, bias and scale of the gyro are
+least squares. Without the scale a turn that begins and ends would read a wrong scale as a delay.
 Its spread comes from the residuals: the turn has to change for the delay to be seen at all.
 
 One delay serves all pictures, but each may come a little earlier or later. That jitter shows as
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 _CLIP_SIGMAS = 4.0
 _STEPS = 20
 _JITTER_ROUNDS = 4
+_WORST_CONDITION = 1e10
 _MIN_HEADINGS = 10
 
 
@@ -30,6 +32,7 @@ class CameraDelay:
         std_s: One sigma of it, the same for all pictures.
         jitter_s: One sigma by which single pictures differ from it; 0 where the residuals show none.
         gyro_bias_rad_s: To subtract from the gyro's rate.
+        gyro_scale: Turn by the stars over turn by the gyro.
         residual_rad: Heading minus model, of the used fixes.
         rate_rad_s: Turn rate at these fixes' exposures.
         used: Which headings were not clipped.
@@ -39,6 +42,7 @@ class CameraDelay:
     std_s: float
     jitter_s: float
     gyro_bias_rad_s: float
+    gyro_scale: float
     residual_rad: Array
     rate_rad_s: Array
     used: NDArray[np.bool_]
@@ -70,34 +74,51 @@ def camera_delay(
         raise ValueError(f"{int(inside.sum())} headings lie inside the gyro's times, 10 are needed")
     times, heading = arrival_t_s[inside], heading_rad[inside]
     offset = bias = 0.0
+    scale = 1.0
     used = np.ones(len(times), dtype=bool)
-    residual = np.zeros(len(times))
-    normal = np.eye(3)
+    residual, variance = np.zeros(len(times)), np.ones(len(times))
+    normal = np.eye(4)
     for step in range(_STEPS):
-        model = np.interp(times - delay, gyro_t_s, angle) + offset + bias * (times - middle)
+        turned = np.interp(times - delay, gyro_t_s, angle)
+        model = scale * turned + offset + bias * (times - middle)
         residual = np.angle(np.exp(1j * (heading - model)))
         if step == 0:  # the offset may be anything: turn the residuals to their common direction
             offset = float(np.angle(np.exp(1j * residual).sum()))
             continue
         rate = np.interp(times - delay, gyro_t_s, rate_rad_s)
-        design = np.stack((-rate, np.ones_like(rate), times - middle), axis=1)
-        spread = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-        used = np.abs(residual) <= max(_CLIP_SIGMAS * spread, 1e-9)
-        normal = design[used].T @ design[used]
-        if np.linalg.cond(normal) > 1e12:
+        design = np.stack((-scale * rate, np.ones_like(rate), times - middle, turned - turned.mean()), axis=1)
+        variance = _variance(residual, rate)
+        used = residual**2 <= np.maximum(_CLIP_SIGMAS**2 * variance, 1e-18)
+        weighted = design[used] / variance[used, None]
+        normal = design[used].T @ weighted
+        size = np.sqrt(np.diag(normal))
+        if size.min() <= 0.0 or np.linalg.cond(normal / np.outer(size, size)) > _WORST_CONDITION:
             raise ValueError("the turn rate changes too little to see a delay")
-        change = np.linalg.solve(normal, design[used].T @ residual[used])
-        delay, offset, bias = delay + change[0], offset + change[1], bias + change[2]
+        change = np.linalg.solve(normal, weighted.T @ residual[used])
+        delay, bias, scale = delay + change[0], bias + change[2], scale + change[3]
+        offset += change[1] - change[3] * turned.mean()
         if abs(change[0]) < 1e-7:
             break
-    freedom = max(int(used.sum()) - 3, 1)
-    variance = float((residual[used] ** 2).sum()) / freedom
-    std = float(np.sqrt(variance * np.linalg.inv(normal)[0, 0]))
+    freedom = max(int(used.sum()) - 4, 1)
+    surplus = float((residual[used] ** 2 / variance[used]).sum()) / freedom
+    std = float(np.sqrt(max(surplus, 1.0) * np.linalg.inv(normal)[0, 0]))
     whole = np.zeros(len(arrival_t_s), dtype=bool)
     whole[np.flatnonzero(inside)[used]] = True
     rate = np.interp(times[used] - delay, gyro_t_s, rate_rad_s)
     jitter = _jitter_s(residual[used], rate)
-    return CameraDelay(float(delay), std, jitter, -float(bias), residual[used], rate, whole)
+    return CameraDelay(
+        float(delay), std, jitter, -float(bias) / scale, float(scale), residual[used], rate, whole
+    )
+
+
+def _variance(residual_rad: Array, rate_rad_s: Array) -> Array:
+    """Variance of each residual, growing with the turn rate: from the medians of slow and fast ones."""
+    order = np.argsort(np.abs(rate_rad_s))
+    slow, fast = order[: len(order) // 2], order[-(len(order) // 3) :]
+    low, high = (1.4826**2 * float(np.median(residual_rad[rows] ** 2)) for rows in (slow, fast))
+    low2, high2 = (float(np.median(rate_rad_s[rows] ** 2)) for rows in (slow, fast))
+    slope = max(high - low, 0.0) / max(high2 - low2, 1e-12)
+    return np.maximum(low + slope * (rate_rad_s**2 - low2), max(0.25 * low, 1e-18))
 
 
 def _jitter_s(residual_rad: Array, rate_rad_s: Array) -> float:

@@ -138,7 +138,7 @@ def delay(
         files = [source / "imu.csv", source / "stars.csv"]
         gyro = _columns(files[0], ("t_s", "omega_rad_s"))
         stars = _columns(files[1], ("t_arrival_s", "heading_rad"))
-        turns = Turns(*gyro, *stars, _GUESS_S)
+        turns = Turns(gyro[0], gyro[1], stars[0], stars[1], _GUESS_S)
     else:
         files, turns = [source], turns_of(source, vehicle)
     with refusing(source), progress_line() as progress:

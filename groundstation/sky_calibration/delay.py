@@ -75,6 +75,7 @@ def delay_from_headings(
             "delay": Quantity(found.delay_s, found.std_s, "s"),
             "jitter": Quantity(found.jitter_s, math.nan, "s"),
             "gyro_bias": Quantity(found.gyro_bias_rad_s, math.nan, "rad/s"),
+            "gyro_scale": Quantity(found.gyro_scale, math.nan, "1"),
         },
         residual={"heading_rms": Quantity(rms, math.nan, "rad")},
         notes={"headings": int(found.used.sum()), "clipped": int((~found.used).sum())},
