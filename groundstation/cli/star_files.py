@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import track
 
 from calibration.camera import CameraCalibration
+from calibration.camera.overhead_camera import OverheadCamera
 from groundstation.cli.errors import UsageError
 from groundstation.star_tracking.survey import Anchor
 
@@ -38,11 +39,18 @@ def find_frames(folder: Path, sub_folder: str = "frames") -> list[Path]:
     return found
 
 
-def read_frame(path: Path, camera: CameraCalibration | None) -> NDArray[np.uint8]:
-    """Read one grey 8-bit picture of the camera's size; of any size without a camera.
+def read_frame(
+    path: Path, camera: CameraCalibration | OverheadCamera | None, *, is_colour: bool | None = False
+) -> NDArray[np.uint8]:
+    """Read one 8-bit picture of the camera's size; of any size without a camera.
+
+    Args:
+        path: The file.
+        camera: Whose size it must have.
+        is_colour: Whether it must be in blue-green-red, (h, w, 3), instead of grey, (h, w); None: either.
 
     Raises:
-        UsageError: The file is empty, torn, no picture, in colour, not 8 bit, or of another size.
+        UsageError: The file is empty, torn, no picture, in colour or not, not 8 bit, or of another size.
     """
     try:
         data = path.read_bytes()
@@ -56,11 +64,13 @@ def read_frame(path: Path, camera: CameraCalibration | None) -> NDArray[np.uint8
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise UsageError(f"{path}: is no picture that can be decoded.")
-    if image.ndim != 2:
+    if is_colour and (image.ndim != 3 or image.shape[2] != 3):
+        raise UsageError(f"{path}: is a grey picture or has transparency, expected one in colour.")
+    if is_colour is False and image.ndim != 2:
         raise UsageError(f"{path}: has {image.shape[2]} colour channels, expected a grey picture.")
     if image.dtype != np.uint8:
         raise UsageError(f"{path}: has {8 * image.dtype.itemsize}-bit pixels, expected 8 bit.")
-    if camera is not None and image.shape != (camera.height, camera.width):
+    if camera is not None and image.shape[:2] != (camera.height, camera.width):
         raise UsageError(
             f"{path}: is {image.shape[1]} x {image.shape[0]} px, camera.json says "
             f"{camera.width} x {camera.height}."

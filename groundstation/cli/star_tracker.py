@@ -17,7 +17,7 @@ import typer
 from numpy.typing import NDArray
 
 from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
-from groundstation.cli import star_amend, star_calibration, star_survey
+from groundstation.cli import star_amend, star_calibration, star_overhead, star_survey
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
     check_targets,
@@ -58,6 +58,8 @@ app.command()(star_calibration.mount)
 app.command()(star_calibration.delay)
 app.command()(star_survey.survey)
 app.command()(star_amend.amend)
+app.command()(star_overhead.overhead)
+app.command("overhead-pose")(star_overhead.overhead_pose)
 
 
 class Method(StrEnum):

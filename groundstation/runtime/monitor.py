@@ -73,6 +73,8 @@ class VehicleMonitor:
     """Truth against goal."""
     refused: dict[str, int] = field(default_factory=dict)
     """Fixes refused, by the kind of reason (what stands before the colon)."""
+    verdict: str = ""
+    """What the referee of two sources of fixes said last."""
     unused: dict[str, int] = field(default_factory=dict)
     """Fixes that fusion did not use, by reason."""
     nis: deque[float] = field(default_factory=lambda: deque(maxlen=NIS_KEPT))
@@ -148,6 +150,8 @@ class Monitor:
             self.say(
                 f"{payload.vehicle}: {payload.phase}" + (f" ({payload.detail})" if payload.detail else "")
             )
+        elif isinstance(payload, m.FixComparison):
+            self._referee(vehicle, payload)
         elif isinstance(payload, m.SkyChange):
             star = f"star {payload.star}" if payload.star else "a light that is no star"
             self.say(
@@ -204,6 +208,13 @@ class Monitor:
         elif not is_silent and name in self._silent_nodes:
             self._silent_nodes.discard(name)
             self.say(f"{name}: its valve node speaks")
+
+    def _referee(self, vehicle: VehicleMonitor, payload: m.FixComparison) -> None:
+        """Say when two sources of fixes begin to disagree, and when they agree again."""
+        if payload.verdict != vehicle.verdict and "disagree" in (payload.verdict, vehicle.verdict):
+            says = f"{payload.verdict}: {payload.reason}" if payload.reason else payload.verdict
+            self.say(f"{payload.vehicle}: star fixes and overhead fixes {says}")
+        vehicle.verdict = payload.verdict
 
     def _diagnostics(self, payload: m.Diagnostics) -> None:
         is_port = bool(payload.summary) and not payload.keys

@@ -79,8 +79,24 @@ def summarise(track: Track) -> dict[str, Any]:
         "fix_innovation_position_rms_mm": _rms(np.hypot(used[:, 2], used[:, 3])) * 1e3,
         "fix_innovation_heading_rms_deg": math.degrees(_rms(used[:, 4])),
         "fix_nis_mean": float(used[:, 5].mean()) if len(used) else math.nan,
+        **({"star_against_overhead": compared(track.comparisons)} if track.comparisons else {}),
         "latency_p50_ms": {} if latency is None else _stages(latency, latency.p50_s),
         "latency_p99_ms": {} if latency is None else _stages(latency, latency.p99_s),
+    }
+
+
+def compared(pairs: list[m.FixComparison]) -> dict[str, Any]:
+    """Star fixes against overhead fixes over a whole recording, and the last verdict of the referee."""
+    differences = np.array([pair.difference for pair in pairs])
+    mean, rms = differences.mean(axis=0), np.sqrt((differences**2).mean(axis=0))
+    return {
+        "pairs": len(pairs),
+        "mean_mm_mm_deg": [*(mean[:2] * 1e3).tolist(), math.degrees(mean[2])],
+        "rms_mm_mm_deg": [*(rms[:2] * 1e3).tolist(), math.degrees(rms[2])],
+        "nis_over_3": float(np.mean([pair.nis for pair in pairs])) / 3.0,
+        "disagreed_ratio": float(np.mean([pair.verdict == "disagree" for pair in pairs])),
+        "last_verdict": pairs[-1].verdict,
+        "reason": pairs[-1].reason,
     }
 
 
@@ -96,6 +112,8 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 any JSON value
     """Round for people, and turn NaN into null: JSON has none."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
     if isinstance(value, float):
         return None if not math.isfinite(value) else round(value, 4)
     return value

@@ -18,6 +18,7 @@ _KINDS = (
     m.ValveCommand,
     m.SequencePhase,
     m.FixAccount,
+    m.FixComparison,
     m.Latency,
     m.Imu,
 )
@@ -34,6 +35,7 @@ class Track:
         open_masks: Rows of t, open mask; shape (n, 2).
         flying_since_s: When the start sequence said so; NaN if never.
         fixes: Counts of fixes used and refused, by reason.
+        comparisons: Of star fixes with overhead fixes, where there are both.
         accounts: Rows of t, used (1 or 0), innovation x, y (m), heading (rad), NIS; shape (n, 6).
         account_reasons: What was said of each row.
         latency: The newest summary.
@@ -49,6 +51,7 @@ class Track:
     account_reasons: list[str] = field(default_factory=list)
     flying_since_s: float = math.nan
     fixes: dict[str, int] = field(default_factory=dict)
+    comparisons: list[m.FixComparison] = field(default_factory=list)
     latency: m.Latency | None = None
     frames_lost: int = 0
     imu_frames: int = 0
@@ -91,6 +94,8 @@ def read_tracks(source: Recording) -> dict[str, Track]:
                 track.fixes[reason] = track.fixes.get(reason, 0) + 1
                 track.account_reasons.append(payload.reason)
                 row["accounts"].append((t_s, float(payload.used), *payload.innovation, payload.nis))
+            case m.FixComparison():
+                track.comparisons.append(payload)
             case m.Latency():
                 track.latency = payload
             case m.Imu():

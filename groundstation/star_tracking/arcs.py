@@ -15,9 +15,9 @@ Places = NDArray[np.complex128]
 
 _SEEDS = 28  # rim points that are paired
 _MAX_CIRCLES = 4
-_NEAR_PX = 0.8  # a rim point this near lies on the circle
+_NEAR_PX = 0.7  # a rim point this near lies on the circle
 _ARC_BINS = 24
-_MIN_ARC_BINS = 10  # 150 degrees of rim, else a straight edge or a hand may pass for a circle
+_MIN_ARC_BINS = 13  # 195 degrees of rim, else a straight edge or a hand may pass for a circle
 _MIN_FILLED_RATIO = 0.45
 _RIM_SIGMA_PX = 0.12  # at least: colour filter, blur over an uneven ground
 _MIN_POINTS = 12

@@ -55,7 +55,7 @@ class ColourSettings:
 
     hue_deg: tuple[tuple[str, float], ...] = (("red", 0.0), ("green", 120.0), ("blue", 225.0))
     hue_half_width_deg: float = 35.0
-    min_saturation: int = 100
+    min_saturation: int = 140
     min_value: int = 24
     area_ratio: float = 0.15
     max_elongation: float = 1.3
