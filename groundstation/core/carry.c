@@ -1,14 +1,13 @@
 /* A stretch of stored packets as a whole: motion, error transition and process noise in one pass each; the twin of
- * groundstation/fusion/flight.py, where the formulas are explained. States and their order: error_state.py.
+ * groundstation/fusion/flight.py, where the formulas are explained.
  */
 #include "core.h"
+#include "error_state.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { THETA, VX, VY, PX, PY, GYRO_BIAS, ACC_BIAS_X, ACC_BIAS_Y, SLOPE_X, SLOPE_Y, GYRO_SCALE };
-enum { WAVE_X = 13, WAVE_Y, MXX, MXY, MYX, MYY, GYRO_TEMPCO, ACC_TEMPCO_X, ACC_TEMPCO_Y, FIX_DELAY, SIZE };
-enum { MOVING = 5, NEIGHBOURS = 25 };
+enum { NEIGHBOURS = 25 };
 
 /* A row of the history; see packet_history.py. */
 typedef struct {

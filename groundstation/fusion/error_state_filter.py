@@ -23,6 +23,7 @@ from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.force_doubt import ForceDoubt
+from groundstation.fusion.late_fix import LateFix
 from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
@@ -76,6 +77,7 @@ class ErrorStateFilter:
         core = core or default_core()
         self._reckoner = make_reckoner(noise, self.counters, table_map, core)
         self._carrier = Carrier(noise, table_map, core)
+        self._late_fix = LateFix(noise, core)
         self._candidates: list[Fix] = []
         self._past = PastFixes()
         self._rests: list[tuple[float, float]] = []
@@ -229,20 +231,14 @@ class ErrorStateFilter:
         surface, x, P = self._propagate(reckoner.checkpoint_s, t, steps)
         omega_read = self._reckoner.history.omega_at(t)
         z, H = measurements.predict_fix(fix, x, omega_read, self.noise)
-        PH = P[:, : es.SIZE] @ H.T
-        S = H @ PH[: es.SIZE]
-        S += measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
-        weight: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
-        nis = float(z @ weight @ z)
-        if nis > self.noise.gate_nis:
+        R = measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
+        nis, S, weight, K = self._late_fix.correct(x, P, z, H, R, self.noise.gate_nis)
+        if not nis <= self.noise.gate_nis:
             if is_late:
                 self.counters.add("fix_outside_the_gate")
                 return _account(fix, "outside the gate", z, nis)
             return self._contradicted(fix, t, z, nis)
         creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - reckoner.checkpoint_s)
-        K = PH @ weight
-        x += K @ z
-        P -= K @ S @ K.T
         P[es.GYRO_BIAS, es.GYRO_BIAS] += creeping
         reckoner.is_lost = False
         if self._trace is not None:
@@ -362,7 +358,7 @@ class ErrorStateFilter:
                 rows = measurements.stand(x, P)
                 es.age(P, b - a, self.noise)
             else:
-                surface, x, P, looked = look(surface, x, P, _ahead(x, 0.5 * (b - a)), self.noise)
+                surface, x, P, looked = self._late_fix.look(surface, x, P, _ahead(x, 0.5 * (b - a)))
                 if steps is not None and self._trace is not None:
                     steps.append(looked)
                 flown = self._carrier.carry(x, self._reckoner.history, a, b)
@@ -427,16 +423,17 @@ class ErrorStateFilter:
             if resting:
                 x[es.VX : es.VY + 1] = 0.0
                 continue
-            x[here] = self._surface.slope(x, _ahead(x, 0.5 * (b - a + is_short * 1e-9 * LOOK_NS)))
+            ahead = _ahead(x, 0.5 * (b - a + is_short * 1e-9 * LOOK_NS))
+            x[here] = self._late_fix.slope(self._surface, x, ahead)
             moved = self._carrier.fly(x, self._reckoner.history, a, b)
             if moved is not None:
                 x[: es.MOVING] = moved
         if not is_short:
-            x[here] = self._surface.slope(x, _ahead(x, 0.5e-9 * LOOK_NS))
+            x[here] = self._late_fix.slope(self._surface, x, _ahead(x, 0.5e-9 * LOOK_NS))
         self._look_due_ns = self._reckoner.newest_ns + LOOK_NS
         self._reckoner.load(x[: es.SIZE], x[: es.MOVING])
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
-        self._reckoner.variance = measurements.variance_in_time(self.x, self.P, noise)
+        self._reckoner.variance = self._late_fix.variance_in_time(self.x, self.P, noise)
 
     def _seconds(self, t_ns: int) -> float:
         return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9
