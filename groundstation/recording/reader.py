@@ -5,11 +5,13 @@ time, so that a recording of any length is read in little memory.
 """
 
 import struct
+from bisect import bisect_left
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
@@ -36,9 +38,12 @@ from groundstation.recording.records import (
 _UNREADABLE = (McapError, EOFError, ValueError, KeyError, OverflowError, OSError, struct.error)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
-    """One recorded message, not yet decoded.
+_MESSAGE = Opcode.MESSAGE.value
+_log_ns = attrgetter("log_ns")
+
+
+class Recorded(NamedTuple):
+    """One recorded message, not yet decoded; a named tuple, since a recording holds millions.
 
     Attributes:
         envelope: Topic, owner, sequence and moment of publication; what the publisher's clock measured
@@ -146,13 +151,16 @@ class Recording:
         chunks.sort(key=lambda index: (index.message_start_time, index.chunk_start_offset))
         pending: list[Recorded] = []
         for position, index in enumerate(chunks):
-            pending.extend(m for m in self._chunk(index, wanted) if low <= m.log_ns < high)
-            pending.sort(key=lambda message: message.log_ns)
+            found = self._chunk(index, wanted)
+            if index.message_start_time < low or index.message_end_time >= high:
+                found = [message for message in found if low <= message.log_ns < high]
+            pending += found
+            pending.sort(key=_log_ns)
             if position + 1 == len(chunks):
                 yield from pending
                 return
             following_ns = chunks[position + 1].message_start_time
-            ready = sum(1 for message in pending if message.log_ns < following_ns)
+            ready = bisect_left(pending, following_ns, key=_log_ns)
             yield from pending[:ready]
             del pending[:ready]
 
@@ -198,7 +206,7 @@ class Recording:
             raise RecordingError(f"{self.path} has no index: try `groundstation recording recover`")
         return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {}))
 
-    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str]]) -> Iterator[Recorded]:
+    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str]]) -> list[Recorded]:
         try:
             if index.chunk_start_offset + index.chunk_length > self._size:
                 raise DamagedChunkError("a chunk is said to lie behind the end of the file")
@@ -209,13 +217,12 @@ class Recording:
             data = chunk.unpack()
         except DamagedChunkError as error:
             raise RecordingError(f"{self.path}: {error}: try `groundstation recording recover`") from error
+        found = []
         for opcode, start, stop in complete_records(data):
-            if opcode == Opcode.MESSAGE:
+            if opcode == _MESSAGE:
                 number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, start)
                 key = wanted.get(number)
                 if key is not None:
-                    yield Recorded(
-                        Envelope(key[0], key[1], sequence, publish_ns),
-                        data[start + MESSAGE.size : stop],
-                        log_ns,
-                    )
+                    envelope = Envelope(key[0], key[1], sequence, publish_ns)
+                    found.append(Recorded(envelope, data[start + MESSAGE.size : stop], log_ns))
+        return found

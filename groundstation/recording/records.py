@@ -112,13 +112,13 @@ def complete_records(data: bytes | mmap, position: int = 0) -> Iterator[Record]:
 
     Opcode 0 is no record: a file system that lost power leaves runs of zeros.
     """
-    end = len(data)
-    while position + RECORD.size <= end:
-        opcode, length = RECORD.unpack_from(data, position)
-        start = position + RECORD.size
-        if length > end - start or opcode == 0:
-            return
+    end, head, unpack = len(data), RECORD.size, RECORD.unpack_from
+    while position + head <= end:
+        opcode, length = unpack(data, position)
+        start = position + head
         position = start + length
+        if position > end or opcode == 0:
+            return
         yield Record(opcode, start, position)
 
 
