@@ -23,7 +23,7 @@ def test_both_sources_hold_the_station_and_the_referee_finds_them_at_one(fly):
         assert np.sqrt(np.mean(turns**2)) < np.radians(0.5)
         compared = flight.of(FixComparison, vehicle)
         assert {pair.verdict for pair in compared} <= {"too few", "agree"}
-        assert 0.3 < np.mean([pair.nis for pair in compared]) / 3 < 2.0
+        assert 0.05 < np.mean([pair.nis for pair in compared]) / 3 < 2.0  # floors are not drawn
     late = [a for a in flight.of(FixAccount, "alpha", 3.0) if a.source == "stars"]
     assert sum(a.used for a in late) > 0.9 * len(late)  # though each comes after later ones from above
 
