@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from bench.fusion.data import SCENARIOS, WRONG_FIXES, folders_of
@@ -16,10 +17,31 @@ from groundstation.fusion.estimator import EstimatorFactory
 from groundstation.fusion.reintegration import ReintegrationEstimator
 
 OURS = "ours"
-PEERS: Mapping[str, EstimatorFactory] = MappingProxyType(
-    {"published method": ReintegrationEstimator, "filterpy": FilterpyPeer, "gtsam": GtsamPeer}
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A way to fly the data.
+
+    Attributes:
+        factory: Of its estimator.
+        is_cleaned: Whether the wrong fixes are taken out for it.
+    """
+
+    factory: EstimatorFactory
+    is_cleaned: bool = False
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        OURS: Method(ErrorStateFilter),
+        "published method": Method(ReintegrationEstimator),
+        "published method, wrong fixes taken out for it": Method(ReintegrationEstimator, is_cleaned=True),
+        "filterpy": Method(FilterpyPeer),
+        "gtsam": Method(GtsamPeer),
+    }
 )
-"""THE TABLE of methods that ours is compared with."""
+"""THE TABLE of methods, ours first."""
 REPEATS = 2
 FIELDS = ("position_mm", "velocity_mm_s", "heading_deg")
 
@@ -27,25 +49,25 @@ FIELDS = ("position_mm", "velocity_mm_s", "heading_deg")
 def measure(bench: Bench) -> list[Row]:
     """A row per method and scenario, and one for time."""
     sample = folders_of(bench, SCENARIOS[0])[0]
-    methods: dict[str, EstimatorFactory] = {}
+    methods: dict[str, Method] = {}
     paces: dict[str, Pace] = {}
     missing = []
-    for name, factory in {OURS: ErrorStateFilter, **PEERS}.items():
+    for name, method in METHODS.items():
         bench.say(f"fusion: pace of {name}")
         try:
-            paces[name] = pace(sample, factory, REPEATS)
+            paces[name] = pace(sample, method.factory, REPEATS)
         except ImportError as error:
             missing.append(Row(f"beside: {name}", "", f"not available: {error}", None))
             continue
-        methods[name] = factory
+        methods[name] = method
     rows = []
     for scenario in (*SCENARIOS, WRONG_FIXES):
         folders = folders_of(bench, scenario)
         runs: dict[str, list[Figures]] = {name: [] for name in methods}
         for number, folder in enumerate(folders):
-            for name, factory in methods.items():
+            for name, method in methods.items():
                 bench.say(f"fusion: {name}, {scenario.name}, {number + 1} of {len(folders)}")
-                runs[name].append(flown(folder, factory))
+                runs[name].append(flown(folder, method.factory, is_cleaned=method.is_cleaned))
         rows += [_accuracy(name, scenario.name, runs) for name in methods]
     return [*rows, *(_time(name, found, paces[OURS]) for name, found in paces.items()), *missing]
 

@@ -3,8 +3,9 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,17 @@ class Figures:
     packets_without: int
 
 
-def flown(folder: Path, factory: EstimatorFactory) -> Figures:
-    """Run one method on one data set and judge it."""
+def flown(folder: Path, factory: EstimatorFactory, *, is_cleaned: bool = False) -> Figures:
+    """Run one method on one data set and judge it.
+
+    Args:
+        folder: The data set.
+        factory: Of the estimator.
+        is_cleaned: Whether the wrong fixes are taken out for it, who could not know them.
+    """
     data = read_folder(folder)
+    if is_cleaned:
+        data = replace(data, stars=data.stars[~_is_wrong(data.stars[:, 0], _truth_of(folder)["wrong_fixes"])])
     estimator = factory(data.noise)
     states, accounts = estimate(data, estimator)
     if isinstance(estimator, OfflineSmoother):
@@ -73,7 +82,7 @@ def judge(
 ) -> Figures:
     """Compare with truth.csv and the truth block of meta.json."""
     truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
-    meta = json.loads((folder / "meta.json").read_text())["truth"]
+    meta = _truth_of(folder)
     t = data.imu[:, 0]
     got = np.array([(math.nan,) * 12 if state is None else state[1:13] for state in states])
     want = np.column_stack([np.interp(t, truth["t_s"], truth[name]) for name in _TRUE])
@@ -115,14 +124,26 @@ def _fixes(
     """Wrong fixes used, wrong fixes, good fixes refused."""
     stamps = np.array([account.t_exposure_ns * 1e-9 for account in accounts])
     used = np.array([account.used for account in accounts], dtype=bool)
-    wrong = np.zeros(len(stamps), dtype=bool)
-    for row in listed:
-        wrong |= np.abs(stamps - row[0]) < SAME_STAMP_S
+    wrong = _is_wrong(stamps, listed)
     return (
         int((wrong & used).sum()),
         int(wrong.sum()),
         int((~wrong & ~used & (stamps < end_s - LAST_S)).sum()),
     )
+
+
+def _truth_of(folder: Path) -> dict[str, Any]:
+    """The truth block of meta.json."""
+    truth: dict[str, Any] = json.loads((folder / "meta.json").read_text())["truth"]
+    return truth
+
+
+def _is_wrong(exposures_s: Array, listed: Sequence[Sequence[float]]) -> NDArray[np.bool_]:
+    """Which exposures, shape (n,), are of wrong fixes."""
+    wrong = np.zeros(len(exposures_s), dtype=bool)
+    for row in listed:
+        wrong |= np.abs(exposures_s - row[0]) < SAME_STAMP_S
+    return wrong
 
 
 def over_seeds(figures: Sequence[Figures], name: str) -> float:
