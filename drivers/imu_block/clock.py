@@ -15,7 +15,7 @@ camera-delay calibration finds.
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.imu_block.frame_v1 import V1_WIRE_BYTES
 from drivers.imu_block.frame_v2 import V2_WIRE_BYTES
@@ -36,14 +36,12 @@ _FUTURE_NS = 20e6
 _LATE_NS = 150e6
 """A tick that jumped and is this late belongs to a restarted block, not to a slow host."""
 _LOST_NS = 50e6
-_LOST_BLOCKS = 5
 _READS_KEPT = 64
 FIRST_JITTER_NS = 3e6
 """Host delay assumed before any is known."""
 
 
-@dataclass(frozen=True, slots=True)
-class TickStamp:
+class TickStamp(NamedTuple):
     """When a frame's averaging window ended.
 
     Attributes:
@@ -162,7 +160,7 @@ class TickClock:
             if elapsed == 0 or not -_FUTURE_NS <= late_ns <= _LATE_NS:
                 self._restart(raw, latest_edge_ns)
                 return None
-        elif self._envelope.floor_of_last_blocks_ns(_LOST_BLOCKS) > _LOST_NS:
+        elif self._envelope.floor_of_last_blocks_ns() > _LOST_NS:
             self._restart(raw, latest_edge_ns)
             return None
         self._tick += elapsed

@@ -43,9 +43,8 @@ class Housekeeping(NamedTuple):
     value: int
 
 
-@dataclass(frozen=True, slots=True)
-class ImuFrame:
-    """One averaged sample as it came over the wire.
+class ImuFrame(NamedTuple):
+    """One averaged sample as it came over the wire; a named tuple, since a thousand are made a second.
 
     Attributes:
         version: 1 (legacy frame) or 2.

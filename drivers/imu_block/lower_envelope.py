@@ -14,6 +14,7 @@ from itertools import pairwise
 
 BLOCK_NS = 1_000_000_000
 BLOCKS_KEPT = 60
+LAST_BLOCKS = 5
 DRIFT_LIMIT = 150e-6
 """Crystals of block and host together: 2 x 50 ppm, and some room for temperature."""
 
@@ -35,6 +36,7 @@ class LowerEnvelope:
         self._lowest: Point = (0.0, float("inf"))
         self._lowest_gap = float("inf")
         self._mean_gap_ns = 0.0
+        self._lowest_of_last = 0.0
 
     @property
     def blocks_closed(self) -> int:
@@ -50,11 +52,9 @@ class LowerEnvelope:
         """Return the line's height at ``x_ns``; infinite before the first point."""
         return self._offset_ns + self.drift * x_ns
 
-    def floor_of_last_blocks_ns(self, count: int) -> float:
-        """Return how far the lowest of the last ``count`` seconds lies over the line (0 with fewer)."""
-        if len(self._blocks) < count:
-            return 0.0
-        return min(self._gap(self._blocks[-1 - i]) for i in range(count))
+    def floor_of_last_blocks_ns(self) -> float:
+        """Return how far the lowest of the last five seconds lies over the line (0 with fewer)."""
+        return self._lowest_of_last - self._offset_ns if len(self._blocks) >= LAST_BLOCKS else 0.0
 
     def add(self, x_ns: float, y_ns: float) -> None:
         """Take one point; abscissae must not go back by more than a block."""
@@ -82,7 +82,9 @@ class LowerEnvelope:
             return
         points = list(self._blocks)
         self.drift = _drift(points)
-        self._offset_ns = min(y - self.drift * x for x, y in points)
+        heights = [y - self.drift * x for x, y in points]
+        self._offset_ns = min(heights)
+        self._lowest_of_last = min(heights[-LAST_BLOCKS:])
         self._mean_gap_ns = sum(map(self._gap, points)) / len(points)
 
 

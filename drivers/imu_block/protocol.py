@@ -179,15 +179,4 @@ def _moved(result: ImuFrame | Reply, by: int) -> ImuFrame | Reply:
     """Return ``result`` with its end offset counted from the start of the whole chunk."""
     if not isinstance(result, ImuFrame):
         return result
-    return ImuFrame(
-        result.version,
-        result.sequence,
-        result.tick_ms,
-        result.sample_count,
-        result.gyro_counts,
-        result.tilt_counts,
-        result.tilt_difference_counts,
-        result.housekeeping,
-        result.attention,
-        result.end_offset + by,
-    )
+    return result._replace(end_offset=result.end_offset + by)

@@ -142,7 +142,7 @@ class Plausibility:
         self._last_gyro_counts = gyro
         if abs(gyro - GYRO_NULL_COUNTS) > GYRO_RANGE_COUNTS:
             off |= SensorFault.GYRO_RANGE.value
-        if status:
+        if int(status) & _REPORTED_BITS:
             off |= _reported(status)
         faults = off & (self._last_off | ~_LASTING)
         self._last_off = off
@@ -176,6 +176,8 @@ _REPORTED = (
     (Status.FAULT_TILT_Y.value, SensorFault.REPORTED_TILT_Y.value),
     (Status.SELF_TEST.value, SensorFault.SELF_TEST.value),
 )
+
+_REPORTED_BITS = sum(bit for bit, _ in _REPORTED)
 
 
 def _reported(status: Status) -> int:

@@ -114,7 +114,7 @@ class ImuReader(Node):
         faults = self._plausibility.update(frame, self._environment.status)
         self._seen_averaging = frame.sample_count
         objection = self._objection(stamp)
-        self._complaint = objection or (faults.name.lower() if faults.name else "")
+        self._complaint = objection or (str(faults.name).lower() if faults else "")
         x, y = frame.tilt_difference_counts
         return Imu(
             stamp.stamp_ns,

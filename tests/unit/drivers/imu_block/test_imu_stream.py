@@ -48,7 +48,7 @@ def feed_in_chunks(parser, stream, cuts):
     for begin, end in itertools.pairwise(edges):
         for result in parser.feed(stream[begin:end]):
             if isinstance(result, ImuFrame):
-                result = dataclasses.replace(result, end_offset=result.end_offset + begin)
+                result = result._replace(end_offset=result.end_offset + begin)
             results.append(result)
     return results
 
