@@ -20,9 +20,7 @@ TRUE_S = 0.055
 @pytest.mark.slow
 def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path):
     text = RIG.read_text().replace("../../calibration", str(RIG.parents[2] / "calibration"))
-    text = text.replace("late_s = 0.6", "late_s = 0.0").replace(
-        "heading_deg = 0.0 }", "heading_deg = 45.0 }"
-    )
+    text = text.replace("late_s = 0.6", "late_s = 0.0").replace("heading_deg = 0.0 }", "heading_deg = 45.0 }")
     station, laboratory = text.split("[laboratory]", 1)
     text = f"{station}[mock_ups.standard.fusion]\nrest_s = 1.0\n[laboratory]" + laboratory.replace(
         "delay_s = 0.015", f"delay_s = {TRUE_S}"
