@@ -89,7 +89,7 @@ class LiveCamera:
                 self._changed.wait_for(lambda: bool(self._orders))
                 now_ns = time.monotonic_ns()
                 while len(self._orders) > 1 and self._orders[0].arrival_ns < now_ns:
-                    self._orders.popleft()  # too slow a machine misses pictures: late ones lie about their age
+                    self._orders.popleft()  # too slow a machine misses pictures; late ones lie of their age
                 exposure = self._orders.popleft()
             image = self._render(exposure)
             # real time is this process's work: a frame leaves when a camera would have sent it
