@@ -433,7 +433,9 @@ class ErrorStateFilter:
         self._look_due_ns = self._reckoner.newest_ns + LOOK_NS
         self._reckoner.load(x[: es.SIZE], x[: es.MOVING])
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
-        self._reckoner.variance = self._late_fix.variance_in_time(self.x, self.P, noise)
+        variance = self._late_fix.variance_in_time(self.x, self.P, noise)
+        measurements.add_scale_in_time(variance, self.P, self._reckoner.omega_rad_s)
+        self._reckoner.variance = variance
 
     def _seconds(self, t_ns: int) -> float:
         return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9

@@ -1,4 +1,4 @@
-"""Stretches in which an accelerometer was not believed: forces as large as the thrust may have acted unseen."""
+"""Stretches in which an accelerometer was not believed: forces as large as the thrust may act unseen."""
 
 from __future__ import annotations
 

@@ -207,3 +207,13 @@ def variance_in_time(x: Array, P: Array, noise: NoiseModel) -> list[float]:
     g = es.GYRO_BIAS
     out += [P[0, 0], noise.gyro_density_rad_s_rthz**2 - 2.0 * P[0, g], P[g, g]]
     return [float(value) for value in out]
+
+
+def add_scale_in_time(variance: list[float], P: Array, omega_rad_s: float) -> None:
+    """Add to the heading's coefficients, in place, what the gyro's scale adds while turning at a rate.
+
+    The rate's error is -(b_g + w s_g); `variance_in_time` has the first part.
+    """
+    g, k, w = es.GYRO_BIAS, es.GYRO_SCALE, omega_rad_s
+    variance[11] -= 2.0 * w * float(P[es.THETA, k])
+    variance[12] += float(2.0 * w * P[g, k] + w * w * P[k, k])

@@ -88,3 +88,15 @@ def test_reported_variances_follow_the_covariance_over_seconds(noise, x):
     H = measurements.reported(x, 0.0)
     assert poly[0] == pytest.approx((H @ P @ H.T)[0, 0])
     assert poly[10] == pytest.approx(P[0, 0])
+
+
+def test_a_turning_vehicles_heading_grows_uncertain_by_the_gyros_scale_too(noise, x):
+    rng = np.random.default_rng(8)
+    A = 1e-3 * rng.normal(size=(es.SIZE, es.SIZE))
+    P, w, tau = A @ A.T, 0.7, 0.8
+    poly = measurements.variance_in_time(x, P, noise)
+    measurements.add_scale_in_time(poly, P, w)
+    grown = np.zeros(es.SIZE)  # the heading's error after tau, from the error states
+    grown[[es.THETA, es.GYRO_BIAS, es.GYRO_SCALE]] = 1.0, -tau, -w * tau
+    want = grown @ P @ grown + noise.gyro_density_rad_s_rthz**2 * tau
+    assert poly[10] + tau * (poly[11] + tau * poly[12]) == pytest.approx(want)
