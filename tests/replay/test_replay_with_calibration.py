@@ -8,6 +8,7 @@ import numpy as np
 from calibration.imu.result import CalibrationResult, Provenance, Quantity
 from calibration.table.table_map import MapProvenance, TableMap
 from groundstation.bus.topics import topic_of
+from groundstation.cli.table_map_flights import read_source
 from groundstation.messages.definitions import FusionCalibration
 from groundstation.recording.reader import Recording
 from groundstation.runtime.lockstep_run import run_lockstep
@@ -41,7 +42,8 @@ def test_files_in_use_are_recorded_and_replay_is_exact_until_they_change(tmp_pat
     imu.write_text(CalibrationResult("test", Provenance("r.mcap", "0" * 64, NOON), scale).to_toml())
     write_map(table_map, 3e-3)
     text = (RIGS / "drawn_fixes.toml").read_text()
-    text = text.replace("y_max_m = 1.5", 'y_max_m = 1.5\nmap = "map.toml"')
+    legs = "legs = { A = [-1.8, -1.3], B = [1.8, -1.3], C = [0.0, 1.3] }"
+    text = text.replace("y_max_m = 1.5", f'y_max_m = 1.5\nmap = "map.toml"\n{legs}')
     text = text.replace("baud = 250000", 'baud = 250000\ncalibration = ["imu.toml"]')
     rig_path, path = tmp_path / "rig.toml", tmp_path / "run.mcap"
     rig_path.write_text(text + "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n")
@@ -53,6 +55,8 @@ def test_files_in_use_are_recorded_and_replay_is_exact_until_they_change(tmp_pat
     assert dict(zip(said.names, said.sha256, strict=True)).items() <= info.calibration_sha256.items()
     assert report.agrees
     assert not report.missing_inputs
+    # advice on levelling finds the legs in the recorded rig
+    assert read_source(path, None, None).legs_m == {"A": (-1.8, -1.3), "B": (1.8, -1.3), "C": (0.0, 1.3)}
 
     write_map(table_map, 1e-3)
     _, _, report = replayed(path)
