@@ -22,7 +22,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy loads: figures are per core
 
 import cv2  # noqa: E402
-from bench import fresh_clone, live, lockstep_speed, many_mock_ups, parser, station_keeping  # noqa: E402
+from bench import fresh_clone, live, lockstep_speed, many_mock_ups, overhead, parser, station_keeping  # noqa: E402
 from bench import table as bench_table  # noqa: E402
 from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
 from bench.fusion import folder as fusion_folder  # noqa: E402
@@ -49,6 +49,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "star_sky": star_sky.measure,
         "star_peers": star_peers.measure,
         "star_folder": star_folder.measure,
+        "overhead": overhead.measure,
         "fusion": fusion_accuracy.measure,
         "fusion_speed": fusion_speed.measure,
         "fusion_peers": fusion_peers.measure,

@@ -1,29 +1,27 @@
-"""How well mock-ups are found from above: accuracy, truth of the covariance, CPU time, on emulated pictures.
+"""How well mock-ups are found from above: accuracy, truth of the covariance, CPU time; emulated pictures."""
 
-``python tools/bench_overhead.py`` prints ``what | limit | measured | ok``; ``overhead_rows`` gives the rows.
-"""
-
-import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import cv2
 import numpy as np
-from bench.rows import Row
-from bench.unit import blur_s, picture
 from numpy.typing import NDArray
 
+from bench.rows import ROOT, Bench, Row
+from bench.unit import blur_s, picture
 from calibration.camera.liveries import load_liveries
 from calibration.camera.overhead_camera import OverheadCamera
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
 from groundstation.star_tracking.overhead import OverheadFix, OverheadTracker
 
-FILES = Path(__file__).parents[1] / "calibration" / "rigs" / "emulated"
+FILES = ROOT / "calibration" / "rigs" / "emulated"
 KINDS = (("at rest", 0.0, 0, 0.3), ("0.5 m/s, 10 ms", 0.0025, 0, 0.3), ("JPEG 95", 0.0, 95, 0.6))
 """What, sigma of half the way during the exposure (m), JPEG quality (0: raw), position limit (mm)."""
+
+MOST = 60
+"""Pictures of a kind: enough for figures that hold to a tenth, at 30 ms to draw and 20 ms to solve each."""
 
 
 @dataclass
@@ -37,19 +35,22 @@ class Found:
     unit_s: list[float] = field(default_factory=list)
 
 
-def overhead_rows(frames: int) -> Iterator[Row]:
-    """Measure every kind on so many pictures of two mock-ups each."""
+def measure(bench: Bench) -> list[Row]:
+    """Measure every kind on pictures of two mock-ups each."""
     bodies = {name: Body(marks, 0.2) for name, marks in read_markings(FILES / "circles.toml").items()}
     optics = read_overhead_camera(FILES / "overhead_camera.json")
     view = TableView(optics, (-2.0, 2.0, -1.5, 1.5), bodies, Light(), np.random.SeedSequence(77))
     tracker = OverheadTracker(
         OverheadCamera.load(FILES / "overhead_camera.json"), load_liveries(FILES / "circles.toml")
     )
+    rows: list[Row] = []
     for what, half_m, quality, limit_mm in KINDS:
-        yield from _rows(what, _measure(view, tracker, frames, half_m, quality), limit_mm)
+        bench.say(f"from above, {what}")
+        rows += _rows(what, _look(view, tracker, min(bench.frames, MOST), half_m, quality), limit_mm)
+    return rows
 
 
-def _measure(view: TableView, tracker: OverheadTracker, frames: int, half_m: float, quality: int) -> Found:
+def _look(view: TableView, tracker: OverheadTracker, frames: int, half_m: float, quality: int) -> Found:
     rng, found, grey = np.random.default_rng(78), Found(), picture()
     for sequence in range(frames):
         poses = np.array([
@@ -95,12 +96,3 @@ def _rows(what: str, found: Found, limit_mm: float) -> Iterator[Row]:
     cpu_s = float(np.median(found.cpu_s))
     units = cpu_s / float(np.median(found.unit_s))
     yield Row(f"{name}: CPU per picture", "", f"{1e3 * cpu_s:.1f} ms, {units:.0f} blurs of 640 x 480", None)
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=60, help="pictures of each kind (default 60)")
-    options = parser.parse_args()
-    cv2.setNumThreads(1)
-    for row in overhead_rows(options.frames):
-        print(" | ".join(row.cells))
