@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.core.build import CoreBuildError, compile_core, is_fresh
-from groundstation.core.library import load_core
+from groundstation.core.build import CoreBuildError, compile_core
+from groundstation.core.library import CoreError, load_core
 
 
 @pytest.fixture(scope="session")
@@ -13,8 +13,10 @@ def compiled_core(request, tmp_path_factory):
     chosen = request.config.getoption("--core-library")
     if chosen:
         return load_core(Path(chosen))
-    if is_fresh():
+    try:
         return load_core()
+    except CoreError:  # not compiled, or the sources changed since; perhaps even since this process loaded it
+        pass
     try:
         return load_core(compile_core(tmp_path_factory.mktemp("core") / "core.so"))
     except CoreBuildError as error:
