@@ -140,8 +140,9 @@ static void advance(Reckoner *r, double *row, double t, double dt, Readings read
 
 /* The state of the centre of mass now: sensor lag undone, lever arm taken off. */
 GS_EXPORT void gs_reckoner_report(Reckoner *r) {
-    const double w = r->omega, lag = r->acc_lag_s, vx = r->vx, vy = r->vy, gx = r->gx, gy = r->gy;
-    const double theta = r->theta + r->gyro_lag_s * w;
+    const double off = (double)(r->newest_ns - r->origin_ns) * 1e-9 - r->newest_s;
+    const double w = r->omega, lag = r->acc_lag_s + off, vx = r->vx, vy = r->vy, gx = r->gx, gy = r->gy;
+    const double theta = r->theta + (r->gyro_lag_s + off) * w;
     const double c = cos(theta), s = sin(theta);
     const double lever_x = c * r->lever_x - s * r->lever_y;
     const double lever_y = s * r->lever_x + c * r->lever_y;

@@ -166,8 +166,10 @@ class Reckoner:
     def report(self) -> PlanarState:
         """Return the state of the centre of mass now: sensor lag undone, lever arm taken off."""
         w = self.omega_rad_s
-        theta = self._theta + self._gyro_lag * w
-        lag = self._acc_lag
+        # the stamp of the row jitters about the tick that the state holds at
+        off = (self.newest_ns - (self.origin_ns or 0)) * 1e-9 - self.newest_s
+        theta = self._theta + (self._gyro_lag + off) * w
+        lag = self._acc_lag + off
         vx, vy = self._vx, self._vy
         c = math.cos(theta)
         s = math.sin(theta)
