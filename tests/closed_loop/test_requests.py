@@ -20,7 +20,7 @@ def ask(flight, action, *numbers, vehicle="alpha", request_id=7):
     return [ack for ack in flight.of(m.Ack) if ack.author == "operator" and ack.request_id == request_id]
 
 
-@pytest.mark.parametrize("action", ACTIONS)
+@pytest.mark.parametrize("action", [name for name in ACTIONS if name != "picture"])
 def test_a_known_request_is_answered_once(fly, action):
     flight = fly().run(2.5)
     numbers = (0.1,) * len(ACTIONS[action].arguments)
@@ -31,6 +31,7 @@ def test_a_known_request_is_answered_once(fly, action):
 @pytest.mark.parametrize(
     ("action", "numbers", "reason"),
     [
+        ("picture", (), "there is no star camera"),  # its fixes are drawn
         ("fire", (), "unknown action 'fire'"),
         ("go_to", (0.1, 0.2), "found 2 numbers"),
         ("go_to", (math.nan, 0.0, 0.0), "finite"),

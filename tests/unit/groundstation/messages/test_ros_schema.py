@@ -5,12 +5,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from groundstation.bus.topics import TOPICS
 from groundstation.messages import definitions as m
+from groundstation.messages.base import PACKAGE
 from groundstation.messages.ros_schema import is_standard, message_text, register, schema_text
 
 CLASSES = [topic.payload for topic in TOPICS]
 
 
-@pytest.mark.parametrize("cls", [m.StarImage, m.Wrench])
+@pytest.mark.parametrize("cls", [m.StarImage, m.StarPicture, m.Wrench])
 @pytest.mark.parametrize("store", [Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY, Stores.LATEST])
 def test_standard_types_are_worded_as_ros_words_them(cls, store):
     # ros_version: rosbags writes ROS 1 text by default
@@ -38,5 +39,6 @@ def test_the_header_stands_first_and_carries_the_vehicle():
 
 def test_every_payload_class_has_a_type_name_of_its_own():
     names = [cls.ROS_TYPE for cls in CLASSES]
-    assert len(set(names)) == len(names)
+    own = [name for name in names if name.startswith(f"{PACKAGE}/")]  # ROS 2's own may serve several topics
+    assert len(set(own)) == len(own) > 20
     assert all(name.count("/msg/") == 1 for name in names)
