@@ -378,6 +378,11 @@ class ErrorStateFilter:
         return surface, x, P
 
     @property
+    def stamp_off_s(self) -> float:
+        """How far the newest packet's stamp lies from the tick that its readings hold at."""
+        return self._seconds(self._reckoner.newest_ns) - self._reckoner.newest_s
+
+    @property
     def history(self) -> PacketHistory:
         """The stored packets; all of them when there is a trace."""
         return self._reckoner.history

@@ -27,7 +27,8 @@ class OfflineSmoother:
         self._map = table_map
         self._filter = ErrorStateFilter(noise, self.trace, table_map)
         self.counters = self._filter.counters
-        self._rows: list[tuple[int, int]] = []  # stamp and row in the history, -1 for a refused packet
+        self._rows: list[tuple[int, float, int]] = []
+        """Of each packet its stamp, how far that lies from its tick, and its row in the history or -1."""
         self._is_finished = False
 
     def begin_rest(self, t_ns: int) -> None:
@@ -43,7 +44,8 @@ class OfflineSmoother:
         before = len(self._filter.history)
         state = self._filter.add_imu(packet)
         after = len(self._filter.history)
-        self._rows.append((packet.t_ns, after - 1 if after > before else -1))
+        row = after - 1 if after > before else -1
+        self._rows.append((packet.t_ns, self._filter.stamp_off_s if row >= 0 else 0.0, row))
         return state
 
     def add_fix(self, fix: Fix) -> FixAccount:
@@ -88,10 +90,13 @@ class OfflineSmoother:
     def states(self) -> list[PlanarState | None]:
         """End the recording; return the smoothed state for each packet given, None where there is none."""
         smoothed = self.finish()
-        values, sigmas = smoothed.state.tolist(), smoothed.std.tolist()
+        rows = np.array([row for _, _, row in self._rows], dtype=np.intp)
+        off = np.array([off_s for _, off_s, _ in self._rows])[:, None]
+        state = smoothed.state[rows]
+        state[:, :2] += off * state[:, 3:5]
+        state[:, 2:3] += off * state[:, 5:6]
+        values, sigmas = state.tolist(), smoothed.std[rows].tolist()
         return [
-            None
-            if row < 0 or values[row][0] != values[row][0]
-            else PlanarState._make([t_ns, *values[row], *sigmas[row], False])
-            for t_ns, row in self._rows
+            None if row < 0 or value[0] != value[0] else PlanarState._make([t_ns, *value, *sigma, False])
+            for (t_ns, _, row), value, sigma in zip(self._rows, values, sigmas, strict=True)
         ]
