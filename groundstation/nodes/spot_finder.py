@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import StarImage, StarSpots
 from groundstation.nodes.node import Node
-from groundstation.star_tracking.detection import DetectorSettings, PictureError, detect
+from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError
 
 _NONE = np.empty(0, np.float32)
 
@@ -31,7 +31,7 @@ class SpotFinder(Node):
     ) -> None:
         super().__init__(vehicle)
         self._size_px = size_px
-        self._settings = settings or DetectorSettings()
+        self._detector = Detector(settings)
         cv2.setNumThreads(1)  # results must not depend on the number of cores
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
@@ -42,7 +42,7 @@ class SpotFinder(Node):
             return
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
         try:
-            spots = detect(image, self._settings)
+            spots = self._detector.find(image)
         except PictureError as error:
             yield self._unusable(message, now_ns, str(error))
             return

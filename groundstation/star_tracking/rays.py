@@ -120,8 +120,11 @@ def undistort(
         if max(float(np.max(np.abs(ex))), float(np.max(np.abs(ey)))) < 1e-12:
             break
     _, _, d = distort(camera, x, y)
-    scale = np.diag([1.0 / camera.fx, 1.0 / camera.fy])
-    return x, y, np.asarray(np.linalg.inv(d) @ scale, dtype=np.float64)
+    det = d[:, 0, 0] * d[:, 1, 1] - d[:, 0, 1] * d[:, 1, 0]
+    by_pixel = np.empty_like(d)
+    by_pixel[:, 0, 0], by_pixel[:, 0, 1] = d[:, 1, 1] / (det * camera.fx), -d[:, 0, 1] / (det * camera.fy)
+    by_pixel[:, 1, 0], by_pixel[:, 1, 1] = -d[:, 1, 0] / (det * camera.fx), d[:, 0, 0] / (det * camera.fy)
+    return x, y, by_pixel
 
 
 def distort(

@@ -22,9 +22,9 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import StarFix
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.refinement import spot_covariance
-from groundstation.star_tracking.sky_adjustment import project
 from groundstation.star_tracking.sky_change import Change, Place, SkyChange
 from groundstation.star_tracking.stray_lights import StrayLights, StraySettings
+from groundstation.star_tracking.view_outline import ViewOutline
 
 Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
@@ -82,8 +82,10 @@ class SkyWatch:
     ) -> None:
         self._settings = settings or SkyWatchSettings()
         self._catalogue = catalogue
-        self._camera = camera
         self._rays = CeilingRays(camera)
+        self._view = ViewOutline(camera, self._settings.margin_px)
+        self._hit_nats = math.log(self._settings.p_false / self._settings.p_seen)
+        self._miss_nats = math.log((1.0 - self._settings.p_false) / (1.0 - self._settings.p_seen))
         self._star_m = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
         self._star = catalogue.x_m + 1j * catalogue.y_m
         self._tree = cKDTree(self._star_m)
@@ -120,30 +122,28 @@ class SkyWatch:
         points = self._rays.look_up(spots.u_px, spots.v_px)
         turn = np.exp(1j * fix.heading_rad)
         where = turn * points.q_body_m + complex(fix.x_m, fix.y_m)
-        off, nearest = self._tree.query(np.stack((where.real, where.imag), axis=1))
+        off, nearest = self._tree.query(where.view(np.float64).reshape(-1, 2))
         nearest = np.asarray(nearest, dtype=np.int64)
         mine = np.asarray(off) < self._gate_m[nearest]
         cov = spot_covariance(points, spots.cov_px2)
         arm2 = np.abs(points.q_body_m) ** 2
         variance = 0.5 * (cov[:, 0, 0] + cov[:, 1, 1] + fix.cov[0, 0] + fix.cov[1, 1]) + arm2 * fix.cov[2, 2]
-        changes = self._watch_life(fix, nearest[mine])
-        changes += self._watch_places(where[mine], nearest[mine], np.sqrt(variance[mine]))
-        return changes + self._strays.note(
-            where[~mine], lambda places: self._shows(fix, places), self._systematic_m2
-        )
+        star = nearest[mine]
+        shown = self._shows(fix, np.concatenate((self._star, self._strays.places_m)))
+        count = len(self._star)
+        changes = self._watch_life(shown[:count], star)
+        changes += self._watch_places(where[mine], star, np.sqrt(variance[mine]))
+        return changes + self._strays.note(where[~mine], shown[count:], self._systematic_m2)
 
-    def _watch_life(self, fix: StarFix, seen: Index) -> list[SkyChange]:
+    def _watch_life(self, due: NDArray[np.bool_], seen: Index) -> list[SkyChange]:
         settings = self._settings
-        due = self._shows(fix, self._star)
         was_seen = np.zeros(len(self._star), dtype=bool)
         was_seen[seen] = True
-        nats_miss = math.log((1.0 - settings.p_false) / (1.0 - settings.p_seen))
-        nats_hit = math.log(settings.p_false / settings.p_seen)
-        self._dead_nats[due] *= settings.forget
-        self._dead_nats[due] += np.where(was_seen[due], nats_hit, nats_miss)
+        nats = settings.forget * self._dead_nats + np.where(was_seen, self._hit_nats, self._miss_nats)
         limit = 1.5 * settings.threshold_nats  # so that a long life does not hide a death
-        np.clip(self._dead_nats, -limit, limit, out=self._dead_nats)
-        self._missed[due & ~was_seen] += 1
+        nats = np.minimum(np.maximum(nats, -limit), limit)
+        self._dead_nats = np.where(due, nats, self._dead_nats)
+        self._missed += due
         self._missed[was_seen] = 0
         died = due & ~self._is_dead & (self._dead_nats > settings.threshold_nats)
         revived = due & self._is_dead & (self._dead_nats < -settings.threshold_nats)
@@ -157,9 +157,12 @@ class SkyWatch:
         std = np.hypot(sigma_m, self._catalogue.std_m[star])
         limit = np.maximum(settings.moved_m, settings.moved_sigmas * std)
         is_off = np.abs(error) > limit
-        self._average(star[~is_off], error[~is_off])
+        at_home = star
+        if is_off.any():
+            at_home, error = star[~is_off], error[~is_off]
+        self._average(at_home, error)
         found = []
-        for row in star[~is_off].tolist():
+        for row in at_home.tolist() if self._elsewhere or self._moved else ():
             if row in self._elsewhere:
                 del self._elsewhere[row]
             if row in self._moved:
@@ -207,17 +210,8 @@ class SkyWatch:
 
     def _shows(self, fix: StarFix, places: Complex) -> NDArray[np.bool_]:
         """Tell which places of the ceiling lie well inside the picture."""
-        inside = np.abs(places - complex(fix.x_m, fix.y_m)) < self._rays.reach_m
-        rows = np.flatnonzero(inside)
-        if len(rows) == 0:
-            return inside
-        pose = np.broadcast_to([fix.x_m, fix.y_m, fix.heading_rad], (len(rows), 3))
-        at = np.stack((places[rows].real, places[rows].imag), axis=1)
-        pixel, _ = project(self._camera, pose, at)
-        margin = self._settings.margin_px
-        size = np.array([self._camera.width - 1.0, self._camera.height - 1.0])
-        inside[rows] = ((pixel > margin) & (pixel < size - margin)).all(axis=1)
-        return inside
+        turn_back = complex(math.cos(fix.heading_rad), -math.sin(fix.heading_rad))
+        return self._view.shows(turn_back * (places - complex(fix.x_m, fix.y_m)))
 
     def _at_home(self, change: Change, row: int, sightings: int) -> SkyChange:
         x, y = self._star_m[row]

@@ -61,30 +61,34 @@ class StrayLights:
         self._miss_nats = math.log((1.0 - settings.p_seen) / (1.0 - settings.p_false))
         self._strays: list[_Stray] = []
 
+    @property
+    def places_m(self) -> Complex:
+        """Where the followed lights hang, shape (k,), table."""
+        return np.array([stray.place.mean for stray in self._strays], dtype=np.complex128)
+
     def note(
         self,
         lights: Complex,
-        is_in_view: Callable[[Complex], NDArray[np.bool_]],
+        is_in_view: NDArray[np.bool_],
         systematic_m2: Callable[[], float],
     ) -> list[SkyChange]:
         """Learn from one picture; give what is newly found.
 
         Args:
             lights: Places of its lights that are no stars, shape (n,), table.
-            is_in_view: Tells which places the picture shows.
+            is_in_view: Which of ``places_m`` the picture shows, shape (k,).
             systematic_m2: Variance per axis of a place that no averaging takes away.
         """
         settings, known = self._settings, len(self._strays)
         seen = np.zeros(known, dtype=bool)
         if known:
-            places = np.array([stray.place.mean for stray in self._strays])
-            distance = np.abs(lights[:, None] - places[None, :])
-            for light, stray in zip(*np.nonzero(distance < settings.gate_m), strict=True):
-                if not seen[stray] and distance[light].argmin() == stray:
-                    seen[stray] = True
-                    self._strays[stray].place.add(complex(lights[light]))
+            distance = np.abs(lights[:, None] - self.places_m[None, :])
+            for light, row in np.argwhere(distance < settings.gate_m).tolist():
+                if not seen[row] and distance[light].argmin() == row:
+                    seen[row] = True
+                    self._strays[row].place.add(complex(lights[light]))
             lights = lights[(distance >= settings.gate_m).all(axis=1)]
-            due = seen | is_in_view(places)
+            due = (seen | is_in_view).tolist()
         found: list[SkyChange] = []
         kept = []
         for row, stray in enumerate(self._strays):
