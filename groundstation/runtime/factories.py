@@ -36,7 +36,8 @@ from groundstation.runtime.estimation import (
     noise_of,
     slope_grid_of,
 )
-from groundstation.runtime.rig import MOCK_UP_RADIUS_M, MockUpSection, Rig
+from groundstation.runtime.rig import MOCK_UP_RADIUS_M, Rig
+from groundstation.runtime.rig_mock_up import MockUpSection
 
 
 def _model(mock_up: MockUpSection) -> VehicleModel:
