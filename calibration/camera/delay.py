@@ -3,10 +3,11 @@
 A heading that arrived at ``t`` was true at ``t - delay``. With G the integral of the gyro's rate the
 model is ``heading = scale G(t - delay) + offset + bias t``; delay, offset, bias and scale of the gyro are
 least squares. Without the scale a turn that begins and ends would read a wrong scale as a delay.
-Its spread comes from the residuals: the turn has to change for the delay to be seen at all.
+The turn has to change for the delay to be seen at all.
 
-One delay serves all pictures, but each may come a little earlier or later. That jitter shows as
-residuals that grow with the turn rate: ``variance = heading^2 + (rate jitter)^2`` is fitted to them.
+A robust fit finds the delay roughly and leaves wrong headings out. Then noise of the headings, jitter of
+the pictures and random walk of the integrated gyro are told apart (``delay_noise``), and the final fit
+weighs by them: without the walk its spread would be several times too small.
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.camera.delay_noise import fit_noise, gyro_walk_rad2_s
+
 Array = NDArray[np.float64]
 
 _CLIP_SIGMAS = 4.0
 _STEPS = 20
-_JITTER_ROUNDS = 4
+_FINAL_STEPS = 3
 _WORST_CONDITION = 1e10
 _MIN_HEADINGS = 10
 
@@ -99,15 +102,36 @@ def camera_delay(
         offset += change[1] - change[3] * turned.mean()
         if abs(change[0]) < 1e-7:
             break
-    freedom = max(int(used.sum()) - 4, 1)
-    surplus = float((residual[used] ** 2 / variance[used]).sum()) / freedom
-    std = float(np.sqrt(max(surplus, 1.0) * np.linalg.inv(normal)[0, 0]))
+    if int(used.sum()) < _MIN_HEADINGS:
+        raise ValueError(f"{int(used.sum())} headings fit the gyro's turn, {_MIN_HEADINGS} are needed")
+    times, heading = times[used], heading[used]
+    noise, normal = None, np.eye(3)
+    for _ in range(_FINAL_STEPS):
+        turned = np.interp(times - delay, gyro_t_s, angle)
+        rate = np.interp(times - delay, gyro_t_s, rate_rad_s)
+        model = scale * turned + offset + bias * (times - middle)
+        residual = np.angle(np.exp(1j * (heading - model)))
+        design = np.stack((-scale * rate, times - middle, turned), axis=1)
+        if noise is None:
+            noise = fit_noise(times, rate, residual, design, gyro_walk_rad2_s(gyro_t_s, rate_rad_s))
+        white, _ = noise.whiten(times, rate, np.column_stack((residual, design)))
+        normal = white[:, 1:].T @ white[:, 1:]
+        change = np.linalg.solve(normal, white[:, 1:].T @ white[:, 0])
+        delay, bias, scale = delay + change[0], bias + change[1], scale + change[2]
+        residual = residual - design @ change
+        offset += float(np.mean(residual))
+        residual = residual - float(np.mean(residual))
     whole = np.zeros(len(arrival_t_s), dtype=bool)
     whole[np.flatnonzero(inside)[used]] = True
-    rate = np.interp(times[used] - delay, gyro_t_s, rate_rad_s)
-    jitter = _jitter_s(residual[used], rate)
     return CameraDelay(
-        float(delay), std, jitter, -float(bias) / scale, float(scale), residual[used], rate, whole
+        delay_s=float(delay),
+        std_s=float(np.sqrt(np.linalg.inv(normal)[0, 0])),
+        jitter_s=0.0 if noise is None else float(np.sqrt(noise.jitter_s2)),
+        gyro_bias_rad_s=-float(bias) / scale,
+        gyro_scale=float(scale),
+        residual_rad=residual,
+        rate_rad_s=rate,
+        used=whole,
     )
 
 
@@ -119,20 +143,3 @@ def _variance(residual_rad: Array, rate_rad_s: Array) -> Array:
     low2, high2 = (float(np.median(rate_rad_s[rows] ** 2)) for rows in (slow, fast))
     slope = max(high - low, 0.0) / max(high2 - low2, 1e-12)
     return np.maximum(low + slope * (rate_rad_s**2 - low2), max(0.25 * low, 1e-18))
-
-
-def _jitter_s(residual_rad: Array, rate_rad_s: Array) -> float:
-    """Fit ``residual^2 = a + b rate^2`` with weights of its own scatter; the root of b, 0 if it is none."""
-    square, rate2 = residual_rad**2, rate_rad_s**2
-    expected = np.full(len(square), float(square.mean()))
-    slope = slope_std = 0.0
-    for _ in range(_JITTER_ROUNDS):
-        weight = 1.0 / np.maximum(expected, 1e-12) ** 2  # a square of a Gaussian scatters like its mean
-        design = np.stack((np.ones_like(rate2), rate2), axis=1)
-        normal = design.T @ (weight[:, None] * design)
-        if np.linalg.cond(normal) > 1e15:
-            return 0.0
-        level, slope = np.linalg.solve(normal, design.T @ (weight * square))
-        slope_std = float(np.sqrt(2.0 * np.linalg.inv(normal)[1, 1]))
-        expected = np.maximum(level, 0.05 * float(square.mean())) + max(slope, 0.0) * rate2
-    return float(np.sqrt(slope)) if slope > 2.0 * slope_std else 0.0

@@ -58,7 +58,11 @@ def delay_from_headings(
             best = cost, found
     if best is None:
         raise CalibrationRefusedError(refusal)
-    found = best[1]
+    # A guess far off leaves out headings at the ends that the delay found can use: once more from there.
+    try:
+        found = camera_delay(gyro_t_s, rate_rad_s, arrival_t_s, heading_rad, best[1].delay_s)
+    except ValueError as error:
+        raise CalibrationRefusedError(str(error)) from error
     rms = float(np.sqrt((found.residual_rad**2).mean()))
     warnings: tuple[str, ...] = ()
     if found.delay_s < 0.0:
