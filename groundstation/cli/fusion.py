@@ -34,6 +34,7 @@ ESTIMATE_HEADER = (
 )
 FIXES_HEADER = "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis\n"
 PROGRESS_AFTER_S = 2.0
+INPUTS = ("imu.csv", "stars.csv", "meta.json", "truth.csv")
 
 
 @app.callback()
@@ -58,6 +59,10 @@ def run(
 
     Example: groundstation fusion run samples/fusion/station --out estimate.csv
     """
+    if out.name == "fixes.csv":
+        raise UsageError("--out must not be called fixes.csv: the account of the fixes goes there.")
+    if out.resolve().parent == folder.resolve() and out.name in INPUTS:
+        raise UsageError(f"--out must not be {out}: that is what is read.")
     if method not in ESTIMATORS:
         raise UsageError(f"--method must be one of {', '.join(ESTIMATORS)}, found {method!r}.")
     if smooth and method != "filter":

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.frames import wrap_angle
-from groundstation.fusion.error_state_filter import WAITS
+from groundstation.fusion.error_state_filter import CANDIDATE, CANDIDATE_AGE_S, WAITS
 from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.messages.base import Message
@@ -32,6 +32,7 @@ STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
 DIAGNOSTICS_EVERY = 5
 LONGEST_WAIT_NS = 1_000_000_000
+LONGEST_ALONE_NS = round(1.2 * CANDIDATE_AGE_S * 1e9)
 NO_PACKETS = "no packets come"
 SOURCES: Mapping[type[Message], str] = MappingProxyType({StarFix: "stars", OverheadFix: "overhead"})
 """Messages that bring fixes, and the rig's word for who says them."""
@@ -148,7 +149,8 @@ class Fusion(Node):
         packet = ImuPacket(imu.stamp_ns, dt_s, imu.rate_body_rad_s, *force, imu.temperature_c)
         state = self._estimator.add_imu(packet)
         for account in self._estimator.settled():
-            yield self._account(account, imu.stamp_ns)
+            if account.used or (account.t_exposure_ns, account.source) in self._waiting:  # else named overdue
+                yield from self._hear_account(account, imu.stamp_ns)
         if state is not None:
             self._state = state
             yield self._say(state)
@@ -161,16 +163,22 @@ class Fusion(Node):
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
         )
-        if account.reason == WAITS:  # it is accounted for when the packets up to its exposure are here
+        yield from self._hear_account(account, now_ns)
+
+    def _hear_account(self, account: Account, now_ns: int) -> Iterator[FixAccount]:
+        """Pass on what became of a fix, once: when packets up to its exposure, or a second fix, are here."""
+        if account.reason in (WAITS, CANDIDATE):
             self._waiting[account.t_exposure_ns, account.source] = now_ns, account
         else:
             yield self._account(account, now_ns)
 
     def _overdue(self, now_ns: int) -> Iterator[FixAccount]:
-        """Name the fixes whose packets do not come; should they come after all, a second account follows."""
+        """Name the fixes that wait in vain; should one be used after all, a second account follows."""
         for arrived_ns, account in tuple(self._waiting.values()):
-            if now_ns - arrived_ns > LONGEST_WAIT_NS:
+            if account.reason == WAITS and now_ns - arrived_ns > LONGEST_WAIT_NS:
                 yield self._account(account._replace(reason=NO_PACKETS), now_ns)
+            elif account.reason == CANDIDATE and now_ns - arrived_ns > LONGEST_ALONE_NS:
+                yield self._account(account, now_ns)
 
     def _account(self, account: Account, now_ns: int) -> FixAccount:
         self._waiting.pop((account.t_exposure_ns, account.source), None)

@@ -117,12 +117,16 @@ def draw_fixes(tracks: Mapping[str, Track], path: Path) -> None:
             label = f"{name}: {is_used.sum()} used{words}" if k == 0 else None
             axes.plot(t[compared], shown[compared], ".", color=colour, ms=4, label=label)
             axes.plot(t[~is_used], shown[~is_used], "x", color=colour, ms=6)
+            starts = is_used & ~compared
+            axes.plot(t[starts], shown[starts], "^", color=colour, ms=5)
     for axes, label in zip(panels, labels, strict=True):
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
     panels[3].axhline(3.0, color="black", lw=0.8, ls=":", label="expected mean of used fixes")
     panels[3].set_ylim(bottom=0.0)
-    panels[0].set_title("Every fix against the filter: used (dots), not used (crosses, cut to the frame)")
+    panels[0].set_title(
+        "Every fix against the filter: used (dots), starting it (triangles), not used (crosses, clipped)"
+    )
     figure.legend(loc="outside lower center")
     panels[-1].set_xlabel("exposure, s")
     figure.savefig(path, dpi=DPI)
