@@ -81,12 +81,7 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     median = np.median(readings, axis=0)
     blocks = np.arange(n) // size
     is_wild = _wild(readings, median, sigma)
-    found = [
-        Disturbance(
-            float(t_s[i]), float(t_s[i]), "wild packet", CHANNELS[c], float(abs(readings[i, c] - median[c]))
-        )
-        for i, c in zip(*_worst(readings, median, sigma, is_wild), strict=True)
-    ]
+    found = _jumps(t_s, readings, median, sigma, is_wild)
     count = int(blocks[-1]) + 1
     sums = np.array([np.bincount(blocks, np.where(is_wild, 0.0, readings[:, c]), count) for c in range(3)]).T
     weight = np.bincount(blocks, ~is_wild, count)
@@ -97,7 +92,7 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     white = sigma / np.sqrt(size)
     limit = BLOCK_SIGMAS * np.clip(wander, white, MAX_WANDER * white)
     is_bad = (np.abs(means - centre) > limit).any(axis=1) | (weight < size / 4)
-    found += _disturbances(t_s, readings, blocks, is_bad, centre, limit)
+    found += _disturbances(t_s, np.where(is_wild[:, None], np.nan, readings), blocks, is_bad, centre, limit)
     for k in range(1, MARGIN_BLOCKS + 1):
         wide = is_bad.copy()
         wide[k:] |= is_bad[:-k]
@@ -144,12 +139,19 @@ def _wild(readings: Array, median: Array, sigma: Array) -> NDArray[np.bool_]:
     return result
 
 
-def _worst(
-    readings: Array, median: Array, sigma: Array, is_wild: NDArray[np.bool_]
-) -> tuple[list[int], list[int]]:
+def _jumps(
+    t_s: Array, readings: Array, median: Array, sigma: Array, is_wild: NDArray[np.bool_]
+) -> list[Disturbance]:
+    """Name the packets that jump away and back: one alone is wild, two in a row were knocked."""
+    out = []
     rows = np.nonzero(is_wild)[0]
-    channels = np.argmax(np.abs(readings[rows] - median) / np.maximum(sigma, 1e-300), axis=1)
-    return rows.tolist(), channels.tolist()
+    for run in np.split(rows, np.nonzero(np.diff(rows) > 1)[0] + 1) if len(rows) else []:
+        off = np.abs(readings[run] - median)
+        channel = int(np.argmax(np.max(off / np.maximum(sigma, 1e-300), axis=0)))
+        kind = "wild packet" if len(run) == 1 else "knock"
+        start, end = float(t_s[run[0]]), float(t_s[run[-1]])
+        out.append(Disturbance(start, end, kind, CHANNELS[channel], float(np.max(off[:, channel]))))
+    return out
 
 
 def _disturbances(
@@ -160,12 +162,14 @@ def _disturbances(
     centre: Array,
     limit: Array,
 ) -> list[Disturbance]:
-    """Join neighbouring disturbed blocks and name each stretch."""
+    """Join neighbouring disturbed blocks and name each stretch; wild packets are NaN in `readings`."""
     edges = np.diff(np.concatenate([[0], is_bad.astype(int), [0]]))
     out = []
     for first, last in zip(np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0], strict=True):
         rows = (blocks >= first) & (blocks < last)
         off = np.abs(readings[rows] - centre)
+        if np.isnan(off).all():
+            continue  # nothing but wild packets, which are named already
         channel = int(np.argmax(np.nanmax(off / limit, axis=0)))
         start, end = float(t_s[rows][0]), float(t_s[rows][-1])
         kind = "knock" if end - start <= LONGEST_KNOCK_S else "touch"

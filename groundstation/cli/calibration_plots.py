@@ -44,13 +44,15 @@ def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
     for k, (axes, label) in enumerate(
         zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
     ):
-        axes.plot(rest[:, 0], rest[:, k + 1], ".", markersize=2, color="0.5")
-        axes.axhline(found.mean[k], color="tab:blue")
+        axes.plot(rest[:, 0], rest[:, k + 1], ".", markersize=2, color="0.5", label="packets")
+        axes.axhline(found.mean[k], color="tab:blue", label=f"mean {found.mean[k]:.6f} ± {found.std[k]:.1g}")
         reach = 6.0 * found.packet_sigma[k]
         axes.set_ylim(found.mean[k] - reach, found.mean[k] + reach)
         axes.set_ylabel(label)
-        for cut in found.disturbances:
-            axes.axvspan(cut.start_s - 0.02, cut.end_s + 0.02, color="tab:red", alpha=0.3)
+        for number, cut in enumerate(found.disturbances):
+            once = None if number else f"{len(found.disturbances)} cut out"
+            axes.axvspan(cut.start_s - 0.02, cut.end_s + 0.02, color="tab:red", alpha=0.3, label=once)
+        axes.legend(loc="upper right", ncols=3, fontsize=8)
     axes.set_xlabel("time, s")
     _save(figure, path)
 
@@ -65,7 +67,9 @@ def plot_temperature(found: TemperatureSlope, path: Path) -> None:
         axes.plot(heat, found.block_mean[:, k], ".", color="0.4")
         axes.plot(heat, found.at_reference[k] + found.slope[k] * (heat - found.reference_c), color="tab:blue")
         axes.set_ylabel(label)
-        axes.set_title(f"{found.slope[k]:.3g} ± {found.slope_std[k]:.1g} per °C", fontsize=9)
+        axes.set_title(
+            f"{found.slope[k]:.3g} ± {found.slope_std[k]:.1g} {label.split()[1]} per °C", fontsize=9
+        )
     axes.set_xlabel("temperature, °C")
     _save(figure, path)
 
@@ -94,10 +98,10 @@ def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: P
         axes.plot(
             curve.tau_s, curve.random_walk / np.sqrt(curve.tau_s), "--", color="0.5", label="white noise"
         )
-        axes.axhline(curve.bias_instability * 0.664, color="tab:red", linewidth=0.8, label="lowest")
+        axes.axhline(curve.bias_instability * 0.664, color="tab:red", linewidth=0.8, label="lowest point")
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_ylabel(f"{name}, {units[name]}")
+        axes.set_ylabel(f"{name}, {units[name].replace('^2', '²')}")
         axes.legend(fontsize=8)
     axes.set_xlabel("averaging time, s")
     _save(figure, path)

@@ -37,7 +37,8 @@ def test_quantised_readings_keep_their_noise():
 
 
 @pytest.mark.parametrize(
-    ("start", "stop", "kind"), [(4.0, 4.06, "knock"), (3.0, 5.0, "touch"), (4.0, 4.01, "wild packet")]
+    ("start", "stop", "kind"),
+    [(4.0, 4.06, "knock"), (4.0, 4.02, "knock"), (3.0, 5.0, "touch"), (4.0, 4.01, "wild packet")],
 )
 def test_a_disturbance_is_named_and_cut_out(start, stop, kind):
     t, readings, warmth = a_rest()
