@@ -76,7 +76,8 @@ class Carrier:
     Args:
         noise: of the sensors.
         table_map: what is known of the slope beforehand.
-        core: a compiled one; with ``PURE`` the functions of `flight` are called. Both give the same to 1e-12.
+        core: a compiled one; with ``PURE`` the functions of `flight` are called. Both give the same
+            to rounding: 1e-9 relative, or 1e-12 of the largest element.
 
     Raises:
         CoreError: the core does not fit.

@@ -44,7 +44,8 @@ class LateFix:
 
     Args:
         noise: of sensors and table.
-        core: a compiled one, or ``PURE``; both give the same to 1e-12.
+        core: a compiled one, or ``PURE``; both give the same to rounding, which inversions enlarge:
+            1e-7 relative, or 1e-10 of the largest element.
 
     Raises:
         CoreError: the core does not fit.
