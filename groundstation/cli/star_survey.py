@@ -82,7 +82,9 @@ def _verified(found: Verification) -> str:
         return f"verification: none of {found.pictures} pictures held out could be solved."
     words = (
         f"verification: {found.solved} of {found.pictures} pictures held out solved, "
-        f"{1e3 * found.rms_m:.3f} mm per axis between star and spot"
+        f"{1e3 * found.rms_m:.3f} mm per axis between star and spot "
+        f"({100.0 * found.matched_ratio:.1f} % of {found.spots} spots matched, "
+        f"{100.0 * found.clipped_ratio:.1f} % near a star but clipped)"
     )
     if found.worst_star:
         words += (

@@ -167,6 +167,8 @@ def _outcome(
     if verification is not None:
         residual["verification_rms"] = Quantity(verification.rms_m, math.nan, "m")
         residual["verification_star_rms"] = Quantity(verification.star_std_m, math.nan, "m")
+        residual["verification_matched"] = Quantity(verification.matched_ratio, math.nan, "1")
+        residual["verification_clipped"] = Quantity(verification.clipped_ratio, math.nan, "1")
         notes |= {"pictures_held_out": verification.pictures, "pictures_verified": verification.solved}
     quantities = camera_quantities(sky.camera, sky.adjusted.std_camera)
     quantities["star_std_median"] = Quantity(shape_m, math.nan, "m")
