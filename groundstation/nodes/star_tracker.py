@@ -65,7 +65,7 @@ class StarTracker(Node):
         self._files = (camera, ceiling)
         self._stars, self._lens = StarCatalogue.load(ceiling), CameraCalibration.load(camera)
         self._tracker = tracker.StarTracker(self._stars, self._lens, settings)
-        self._watch = SkyWatch(self._stars, self._lens)
+        self._watch = SkyWatch(self._stars, self._lens, rays=self._tracker.rays)
         self._governor = PriorGovernor()
         self._states = StateMemory()
         self._choice = PictureChoice()

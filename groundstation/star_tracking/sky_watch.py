@@ -72,6 +72,7 @@ class SkyWatch:
         catalogue: The stars.
         camera: The camera behind the fixes.
         settings: When something is called a change.
+        rays: The camera's table, where there is one already.
     """
 
     def __init__(
@@ -79,10 +80,11 @@ class SkyWatch:
         catalogue: StarCatalogue,
         camera: CameraCalibration,
         settings: SkyWatchSettings | None = None,
+        rays: CeilingRays | None = None,
     ) -> None:
         self._settings = settings or SkyWatchSettings()
         self._catalogue = catalogue
-        self._rays = CeilingRays(camera)
+        self._rays = rays or CeilingRays(camera)
         self._view = ViewOutline(camera, self._settings.margin_px)
         self._hit_nats = math.log(self._settings.p_false / self._settings.p_seen)
         self._miss_nats = math.log((1.0 - self._settings.p_false) / (1.0 - self._settings.p_seen))
@@ -122,9 +124,15 @@ class SkyWatch:
         points = self._rays.look_up(spots.u_px, spots.v_px)
         turn = np.exp(1j * fix.heading_rad)
         where = turn * points.q_body_m + complex(fix.x_m, fix.y_m)
-        off, nearest = self._tree.query(where.view(np.float64).reshape(-1, 2))
-        nearest = np.asarray(nearest, dtype=np.int64)
-        mine = np.asarray(off) < self._gate_m[nearest]
+        nearest = np.full(len(where), -1, dtype=np.int64)
+        nearest[fix.spot_index] = fix.star_index
+        # A star within the gate is the nearest one, so that only the other spots have to be looked for.
+        mine = np.abs(where - self._star[nearest]) < self._gate_m[nearest]
+        others = np.flatnonzero(~mine | (nearest < 0))
+        if len(others):
+            off, star = self._tree.query(where[others].view(np.float64).reshape(-1, 2))
+            nearest[others] = star
+            mine[others] = np.asarray(off) < self._gate_m[nearest[others]]
         cov = spot_covariance(points, spots.cov_px2)
         arm2 = np.abs(points.q_body_m) ** 2
         variance = 0.5 * (cov[:, 0, 0] + cov[:, 1, 1] + fix.cov[0, 0] + fix.cov[1, 1]) + arm2 * fix.cov[2, 2]
