@@ -8,7 +8,6 @@ packets, correction there, then the packets since the exposure are integrated ag
 from __future__ import annotations
 
 import copy
-import itertools
 import math
 from dataclasses import replace
 
@@ -22,17 +21,17 @@ from groundstation.fusion.carrier import Carrier
 from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.late_fix import LateFix
 from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.past_fixes import Past, PastFixes
+from groundstation.fusion.rests import Rests
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace
 
-STEP_S = 1.0
-"""Longest stretch over which the local slope is held; an outage is covered in several."""
 REOPENED_VELOCITY_M_S = 0.1
 """Sigma of the velocity after the filter found itself lost: faster than anything flies on a table."""
 MAX_AHEAD_S = 1.0
@@ -43,8 +42,6 @@ WAITS = "waits for packets"
 CANDIDATE = "waits for a second fix"
 CANDIDATE_AGE_S = 5.0
 """A first fix is compared with those up to this long after it."""
-MAX_PLAUSIBLE = 1e3
-"""No table is a kilometre wide, and no fix's heading is that many radians."""
 
 
 class ErrorStateFilter:
@@ -80,7 +77,7 @@ class ErrorStateFilter:
         self._late_fix = LateFix(noise, core)
         self._candidates: list[Fix] = []
         self._past = PastFixes()
-        self._rests: list[tuple[float, float]] = []
+        self._rests = Rests()
         self._refused: list[tuple[float, Array]] = []
         self._creep = CreepWatch()
         self._doubt = ForceDoubt(noise.unseen_force_m_s2_rthz)
@@ -91,18 +88,17 @@ class ErrorStateFilter:
     def begin_rest(self, t_ns: int) -> None:
         """Say that from this stamp the vehicle stands still."""
         self._reckoner.start_clock(t_ns)
-        if not (self._rests and math.isinf(self._rests[-1][1])):
-            self._note_rest((self._seconds(t_ns), math.inf))
+        if self._rests.begin(self._seconds(t_ns)):
+            self._tell_rest()
 
     def end_rest(self, t_ns: int) -> None:
         """Say that from this stamp the vehicle may move."""
-        if self._rests and math.isinf(self._rests[-1][1]):
-            self._note_rest((self._rests.pop()[0], self._seconds(t_ns)))
+        if self._rests.end(self._seconds(t_ns)):
+            self._tell_rest()
             self._integrate_to_now()
 
-    def _note_rest(self, rest: tuple[float, float]) -> None:
-        self._rests.append(rest)
-        self._reckoner.rest_from_s, self._reckoner.rest_to_s = rest
+    def _tell_rest(self) -> None:
+        self._reckoner.rest_from_s, self._reckoner.rest_to_s = self._rests.newest
 
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Integrate one packet; None before the first fix, or when the packet was refused."""
@@ -179,11 +175,9 @@ class ErrorStateFilter:
                 self._accounts.append(account)
 
     def _judge(self, fix: Fix) -> FixAccount:
-        said = (fix.x_m, fix.y_m, fix.heading_rad, *fix.cov.ravel().tolist())
-        if not all(map(math.isfinite, said)):
-            return self._refuse(fix, "not finite")
-        if max(abs(fix.x_m), abs(fix.y_m), abs(fix.heading_rad)) > MAX_PLAUSIBLE:
-            return self._refuse(fix, "not on any table")
+        complaint = complaint_about(fix)
+        if complaint is not None:
+            return self._refuse(fix, complaint)
         reckoner = self._reckoner
         t = self._seconds(fix.t_exposure_ns)
         if not len(reckoner.history) or t < reckoner.history.first_s:
@@ -283,20 +277,17 @@ class ErrorStateFilter:
         a, b = self._seconds(first.t_exposure_ns), self._seconds(second.t_exposure_ns)
         if not 0.0 < b - a < CANDIDATE_AGE_S:
             return False
-        if self._rest_of(a) is not None and self._rest_of(b) is not None:
+        if self._rests.at(a) is not None and self._rests.at(b) is not None:
             return fixes_agree(first, second, Between(0.0, 0.0, 0.0))
         segment = self._reckoner.history.between(a, b)
         turned = float(((segment.omega_rad_s - self.x[es.GYRO_BIAS]) * segment.span_s).sum())
         null_sigma = math.sqrt(self.P[es.GYRO_BIAS, es.GYRO_BIAS])
         return fixes_agree(first, second, Between(b - a, turned, null_sigma))
 
-    def _rest_of(self, t: float) -> tuple[float, float] | None:
-        return next((rest for rest in self._rests if rest[0] <= t <= rest[1]), None)
-
     def _start(self, fix: Fix) -> None:
         """Take the first pose, and what the rest so far has shown."""
         x, P, t = self.x.copy(), self.P.copy(), self._seconds(fix.t_exposure_ns)
-        rest = self._rest_of(t)
+        rest = self._rests.at(t)
         sigma = REOPENED_VELOCITY_M_S if rest is None else measurements.REST_VELOCITY_M_S
         measurements.take_pose(fix, x, P, float(x[es.THETA]), sigma)
         surface, x, P = self._first_look(x, P)
@@ -329,7 +320,7 @@ class ErrorStateFilter:
         self._past.forget()
         if self._trace is not None:
             self._trace.chains.append(
-                Chain(t, x[: es.SIZE].copy(), P[: es.SIZE].copy(), self._rest_of(t) is not None)
+                Chain(t, x[: es.SIZE].copy(), P[: es.SIZE].copy(), self._rests.at(t) is not None)
             )
 
     def _accept(
@@ -342,7 +333,7 @@ class ErrorStateFilter:
         if is_late:
             return
         self._refused.clear()
-        self._rests = [r for r in self._rests if r[1] > oldest]
+        self._rests.forget_before(oldest)
         self._doubt.forget_before(oldest)
         if self._trace is None:
             self._reckoner.history.forget_before(oldest)
@@ -353,7 +344,7 @@ class ErrorStateFilter:
     ) -> tuple[LearnedSurface, Array, Array]:
         """Return surface, state and covariance carried from the checkpoint `start_s` to `stop_s`."""
         surface, x, P = self._surface, self.x.copy(), self.P.copy()
-        for a, b, resting in self._stretches(start_s, stop_s):
+        for a, b, resting in self._rests.stretches(start_s, stop_s):
             if resting:
                 rows = measurements.stand(x, P)
                 es.age(P, b - a, self.noise)
@@ -403,26 +394,12 @@ class ErrorStateFilter:
             self.counters.add("rest_disturbed")
             return None
 
-    def _stretches(self, start_s: float, stop_s: float) -> list[tuple[float, float, bool]]:
-        """Cut an interval at the ends of rests, and flights into steps; True marks rest."""
-        edges = (edge for rest in self._rests for edge in rest)
-        cuts = [start_s, *(edge for edge in edges if start_s < edge < stop_s), stop_s]
-        out = []
-        for a, b in itertools.pairwise(cuts):
-            if any(begin <= 0.5 * (a + b) <= end for begin, end in self._rests):
-                out.append((a, b, True))
-            else:
-                n = max(1, math.ceil((b - a) / STEP_S))
-                inner = [a + (b - a) * i / n for i in range(n)] + [b]
-                out += [(p, q, False) for p, q in itertools.pairwise(inner)]
-        return out
-
     def _integrate_to_now(self) -> None:
         """Run the nominal state from the checkpoint to now, and prepare the reported sigmas."""
         if not self._reckoner.has_pose:
             return
         x, here = self.x.copy(), slice(es.WAVE_X, es.WAVE_Y + 1)
-        stretches = self._stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        stretches = self._rests.stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s)
         is_short = len(stretches) == 1  # then one look, in its middle and that of the second to come, will do
         for a, b, resting in stretches:
             if resting:

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offset_fit import fit_offsets
 from groundstation.fusion.packet_history import PacketHistory, Segment
@@ -157,8 +158,9 @@ class ReintegrationEstimator:
     def add_fix(self, fix: Fix) -> FixAccount:
         """Put the vehicle where the fix saw it, and integrate the packets since."""
         t = self._seconds(fix.t_exposure_ns)
-        if not all(map(math.isfinite, (fix.x_m, fix.y_m, fix.heading_rad))):
-            return self._account(fix, "not finite")
+        complaint = complaint_about(fix)
+        if complaint is not None:
+            return self._account(fix, complaint)
         if self._origin_ns is None or not len(self._history) or t < self._history.first_s:
             return self._account(fix, "before the first packet")
         if t > self._seconds(self._t_ns) + 1e-9:
