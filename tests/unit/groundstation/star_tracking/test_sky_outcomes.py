@@ -138,6 +138,7 @@ def test_a_survey_with_a_wrong_lens_says_so(sweep, camera, change):
     assert "\n" not in warning
 
 
+@pytest.mark.slow
 def test_a_wrong_lens_is_cured_by_freeing_it(sweep, camera):
     wrong = dataclasses.replace(camera, distortion=(-0.08, 0.05, 0.0008, -0.0007, 0.0), cx=318.5)
     freed = survey_sweep(*sweep[:2], wrong, sweep[2], verify_every=0, is_lens_free=True)
