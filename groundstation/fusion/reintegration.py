@@ -45,6 +45,7 @@ class ReintegrationEstimator:
         self._is_fitted = False
         self._fixes: list[tuple[float, float, float, float]] = []  # exposure, IMU point x, y, heading
         self._pose: list[float] | None = None  # theta, vx, vy, px, py of the IMU point
+        self._pose_at_fix: list[float] = []  # the same at the exposure of the newest fix
         self._omega = 0.0
         self._last = (0.0, 0.0, 0.0)
         self._waiting: list[Fix] = []
@@ -61,10 +62,13 @@ class ReintegrationEstimator:
         if self._rest_from is None:
             return
         end = self._seconds(t_ns)
-        rest = self._history.between(self._rest_from, end)
+        self._calibrate(self._rest_from, end)
+        self._rest_from, self._flight_from, self._is_fitted = None, end, False
+
+    def _calibrate(self, start_s: float, stop_s: float) -> None:
+        rest = self._history.between(start_s, stop_s)
         if len(rest.span_s):
             self._offsets = np.array([rest.omega_rad_s.mean(), rest.ax_m_s2.mean(), rest.ay_m_s2.mean()])
-        self._rest_from, self._flight_from, self._is_fitted = None, end, False
 
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Integrate one packet; readings outside the gates are replaced by the last good ones."""
@@ -86,24 +90,34 @@ class ReintegrationEstimator:
         if self._pose is None:
             return None
         if self._rest_from is None:
-            self._integrate(packet.dt_s, omega, ax, ay)
+            self._pose = self._integrate(self._pose, packet.dt_s, omega, ax, ay)
+            self._omega = omega - float(self._offsets[0])
         return self.state()
 
-    def _integrate(self, dt: float, omega: float, ax: float, ay: float) -> None:
-        theta, vx, vy, px, py = self._pose or [0.0] * 5
+    def _integrate(self, pose: list[float], dt: float, omega: float, ax: float, ay: float) -> list[float]:
+        theta, vx, vy, px, py = pose
         w = omega - float(self._offsets[0])
         fx, fy = ax - float(self._offsets[1]), ay - float(self._offsets[2])
         middle = theta + 0.5 * w * dt
         c, s = math.cos(middle), math.sin(middle)
         gx, gy = c * fx - s * fy, s * fx + c * fy
-        self._pose = [
+        return [
             theta + w * dt,
             vx + gx * dt,
             vy + gy * dt,
             px + (vx + 0.5 * gx * dt) * dt,
             py + (vy + 0.5 * gy * dt) * dt,
         ]
-        self._omega = w
+
+    def _carry(self, pose: list[float], start_s: float, stop_s: float) -> list[float]:
+        """Integrate the stored packets between two moments; at rest a vehicle stays where it is."""
+        moves_from = math.inf if self._flight_from is None else self._flight_from
+        if stop_s <= moves_from:
+            return pose
+        segment = self._history.between(max(start_s, moves_from), stop_s)
+        for dt, w, ax, ay in zip(*self._columns(segment), strict=True):
+            pose = self._integrate(pose, dt, w, ax, ay)
+        return pose
 
     def state(self) -> PlanarState | None:
         """Return the state after the newest packet."""
@@ -168,6 +182,9 @@ class ReintegrationEstimator:
             return self._account(fix, "waits for packets")
         if self._fixes and t <= self._fixes[-1][0]:
             return self._account(fix, "older than the last used")
+        if self._rest_from is not None:  # the mean so far, to be shown
+            self._calibrate(self._rest_from, self._seconds(self._t_ns))
+        predicted = self._carry(self._pose_at_fix, self._fixes[-1][0], t) if self._fixes else None
         near = self._pose[0] if self._pose else 0.0
         heading = near + math.remainder(fix.heading_rad - near, math.tau)
         lx, ly = self._lever(heading)
@@ -176,15 +193,23 @@ class ReintegrationEstimator:
         if not resting and not self._is_fitted and t > (self._flight_from or 0.0) + FIT_STRETCH_S:
             self._fit()
         velocity = (0.0, 0.0) if resting else self._finite_difference()
-        self._pose = [heading, *velocity, fix.x_m + lx, fix.y_m + ly]
-        start = t if not resting else max(t, self._flight_from or math.inf)
-        segment = self._history.between(start, self._seconds(self._t_ns))
-        for dt, w, ax, ay in zip(*self._columns(segment), strict=True):
-            self._integrate(dt, w, ax, ay)
+        self._pose_at_fix = [heading, *velocity, fix.x_m + lx, fix.y_m + ly]
+        self._pose = self._carry(self._pose_at_fix, t, self._seconds(self._t_ns))
         if self._is_fitted:
             self._history.forget_before(t)
             self._fixes = self._fixes[-2:]
-        return self._account(fix, "used")
+        return self._used(fix, predicted)
+
+    def _used(self, fix: Fix, predicted: list[float] | None) -> FixAccount:
+        account = self._account(fix, "used")
+        if predicted is None:
+            return account
+        theta, _, _, px, py = predicted
+        lx, ly = self._lever(theta)
+        turned = math.remainder(fix.heading_rad - theta, math.tau)
+        return account._replace(
+            innovation_x_m=fix.x_m - px + lx, innovation_y_m=fix.y_m - py + ly, innovation_heading_rad=turned
+        )
 
     def _finite_difference(self) -> tuple[float, float]:
         if len(self._fixes) < 2:

@@ -40,6 +40,10 @@ def test_it_writes_a_row_per_packet_and_accounts_for_every_fix(folder, tmp_path,
     assert fixes[0] == "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis"
     assert len(fixes) == len((folder / "stars.csv").read_text().splitlines())
     assert not any("waits" in line for line in fixes)
+    used = np.array([row.split(",")[3:6] for row in fixes[1:] if ",used," in row], dtype=float)[1:]
+    assert len(used) > 5
+    assert (np.abs(used).max(axis=0) > 0.0).all()
+    assert np.abs(used).max() < 0.1  # metres and radians: compared with what was expected, not with zero
 
 
 def test_the_estimate_is_causal(folder, tmp_path):
