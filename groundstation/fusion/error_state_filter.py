@@ -36,6 +36,9 @@ REOPENED_VELOCITY_M_S = 0.1
 """Sigma of the velocity after the filter found itself lost: faster than anything flies on a table."""
 MAX_AHEAD_S = 1.0
 """A fix whose exposure is further ahead of the packets has a wrong stamp."""
+LONGEST_HOLE_S = 2.0
+"""Without packets for longer, forces and turns may have come and gone that no sigma holds: until a fix agrees
+the filter is lost."""
 LOOK_NS = 1_000_000_000
 """While no fix comes, how long the local slope is taken to be what it was."""
 WAITS = "waits for packets"
@@ -105,6 +108,9 @@ class ErrorStateFilter:
         reckoner = self._reckoner
         if not reckoner.add(packet):
             return None
+        if packet.dt_s > LONGEST_HOLE_S and reckoner.has_pose and self._rests.at(reckoner.newest_s) is None:
+            reckoner.is_lost = True
+            self.counters.add("packets_missing_for_long")
         if self._waiting:
             self._retry()
         if packet.t_ns > self._look_due_ns:

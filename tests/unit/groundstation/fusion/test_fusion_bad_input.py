@@ -51,6 +51,14 @@ def test_a_hole_is_bridged_and_widens_the_sigmas(flying):
     assert math.hypot(state.x_m, state.y_m) < 0.01
 
 
+def test_a_long_hole_in_flight_is_called_lost_until_a_fix_agrees(flying, fix_cov):
+    state = flying.add_imu(ImuPacket(8000 * MS, 5.0, 0.0, 0.0, 0.0, 25.0))
+    assert state.is_lost
+    assert flying.counters.by_name["packets_missing_for_long"] == 1
+    assert flying.add_fix(Fix(8000 * MS, 8000 * MS, 0.0, 0.0, 0.0, fix_cov)).used
+    assert not flying.add_imu(ImuPacket(8010 * MS, 0.01, 0.0, 0.0, 0.0, 25.0)).is_lost
+
+
 def test_ticks_that_contradict_the_stamps_are_counted_and_the_stamps_win(flying):
     state = flying.add_imu(ImuPacket(4000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
     assert flying.counters.by_name["packet_ticks_and_stamps_disagree"] == 1
