@@ -32,6 +32,8 @@ from groundstation.cli.star_files import (
     with_progress,
     write_atomically,
 )
+from groundstation.cli.star_plots import save_figure
+from groundstation.sky_calibration.figures import draw_board_pose
 from groundstation.star_tracking.overhead import NoOverheadFix, OverheadFix, OverheadTracker
 
 COLUMNS = (
@@ -108,6 +110,7 @@ def overhead_pose(
     square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1)] = 150.0,
     marker_mm: Annotated[float, typer.Option(help="Edge of a marker.", min=0.1)] = 110.0,
     thickness_mm: Annotated[float, typer.Option(help="Of the board.", min=0.0)] = 0.0,
+    plot: Annotated[Path | None, typer.Option(help="Residual plot to write (PNG).")] = None,
     tape_mm: Annotated[float, typer.Option(help="How well places were measured.", min=0.01)] = 2.0,
     tape_deg: Annotated[float, typer.Option(help="How well headings were.", min=1e-3)] = 0.2,
 ) -> None:
@@ -119,7 +122,7 @@ def overhead_pose(
     Example:
       groundstation star-tracker overhead-pose recordings/board --out pose.toml --camera-out camera.json
     """
-    check_targets(out, camera_out)
+    check_targets(out, camera_out, plot)
     columns, _, rows = squares.partition("x")
     if not (columns.isdecimal() and rows.isdecimal()):
         raise UsageError(f"--squares is '{squares}', expected columns x rows like 6x4.")
@@ -150,6 +153,8 @@ def overhead_pose(
     write_atomically(out, _result(folder, pose, len(views)).to_toml())
     if camera_out is not None:
         write_atomically(camera_out, json.dumps(pose.camera.to_mapping(), indent=1) + "\n")
+    if plot is not None:
+        save_figure(draw_board_pose(pose.residual_px, pose.tape_m, pose.tape_rad), plot)
     print(_sentence(pose, len(views)))
 
 

@@ -62,15 +62,17 @@ def draw_survey(
     """
     figure = _figure(14.0, 9.0)
     sky, means, cloud, verified = figure.subplots(2, 2).ravel()
-    sky.plot(pose[:, 0], pose[:, 1], "-", color="0.8", linewidth=1, zorder=0, label="path of the sweep")
+    sky.plot(pose[:, 0], pose[:, 1], "-", color="0.8", linewidth=1, zorder=0)
     dots = sky.scatter(
         star_m[:, 0], star_m[:, 1], s=8 + 4 * times_seen, c=1e3 * std_m.mean(axis=1), cmap="viridis_r"
     )
     figure.colorbar(dots, ax=sky, label="one sigma per axis (mm)")
     sky.set(
-        xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"{len(star_m)} stars; larger: seen more often"
+        xlabel="x (m)",
+        ylabel="y (m)",
+        aspect="equal",
+        title=f"{len(star_m)} stars; larger: seen more often; line: the sweep",
     )
-    sky.legend(loc="upper right")
     _means(means, structure)
     _cloud(cloud, residual_px, "all pictures")
     if len(verified_mm):
@@ -80,6 +82,29 @@ def draw_survey(
     else:
         verified.set(title="no verification")
     verified.set(xlabel="star to spot on the ceiling (mm)", ylabel="sightings")
+    return figure
+
+
+def draw_board_pose(residual_px: Array, tape_m: Array, tape_rad: Array) -> Figure:
+    """What a board on the table leaves of the camera above it: its corners, and each place against the tape.
+
+    Args:
+        residual_px: Corner minus model, shape (n, 2).
+        tape_m: By how much each place had to be moved, shape (k, 2).
+        tape_rad: And turned, shape (k,).
+    """
+    figure = _figure(15.0, 4.5)
+    corners, spread, tape = figure.subplots(1, 3)
+    _cloud(corners, residual_px, "corners of the board")
+    _distribution(spread, residual_px)
+    tape.plot(1e3 * tape_m[:, 0], 1e3 * tape_m[:, 1], "o")
+    for number, (place_m, turn_rad) in enumerate(zip(tape_m, tape_rad, strict=True), start=1):
+        words = f"{number}: {np.degrees(turn_rad):+.2f} deg"
+        tape.annotate(words, 1e3 * place_m, (0, 6), textcoords="offset points", ha="center")
+    tape.axhline(0.0, color="0.8", zorder=0)
+    tape.axvline(0.0, color="0.8", zorder=0)
+    tape.margins(0.35)
+    tape.set(xlabel="moved in x (mm)", ylabel="moved in y (mm)", title="places against the tape")
     return figure
 
 
@@ -107,17 +132,16 @@ def _distribution(axes: Axes, residual_px: Array) -> None:
 def _means(axes: Axes, structure: ResidualStructure) -> None:
     """Arrows over the picture: mean residuals of its cells."""
     verdict = "the lens does not fit" if structure.is_wrong else "no structure that matters"
-    axes.quiver(
-        structure.centre_px[:, 0],
-        structure.centre_px[:, 1],
-        structure.mean_px[:, 0],
-        structure.mean_px[:, 1],
-        angles="xy",
-    )
-    axes.invert_yaxis()
-    axes.set(
-        xlabel="u (px)",
-        ylabel="v (px)",
-        aspect="equal",
-        title=f"mean residuals over the picture: {structure.systematic_px:.4f} px, {verdict}",
+    centre, mean = structure.centre_px, structure.mean_px
+    scale = ""
+    if len(centre):
+        longest = max(float(np.hypot(mean[:, 0], mean[:, 1]).max()), 1e-9)
+        reach = max(0.12 * float(np.ptp(centre[:, 0])), 1.0)  # of the longest arrow, in px of the picture
+        axes.quiver(*centre.T, *mean.T, angles="xy", scale_units="xy", scale=longest / reach)
+        scale = f"; the longest arrow is {longest:.4f} px"
+        (left, top), (right, bottom) = centre.min(axis=0) - reach, centre.max(axis=0) + reach
+        axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.set(xlabel=f"u (px){scale}", ylabel="v (px)", aspect="equal")
+    axes.set_title(
+        f"mean residuals over the picture: {structure.systematic_px:.4f} px, {verdict}", fontsize="medium"
     )

@@ -105,7 +105,8 @@ def test_a_board_on_the_table_tells_where_the_camera_hangs(folder, capsys):
         lines.append(",".join([name, *(str(a + b) for a, b in zip(place, off[name], strict=True))]))
     (folder / "places.csv").write_text("\n".join(lines) + "\n")
     words = ["star-tracker", "overhead-pose", str(folder), "--out", str(folder / "pose.toml")]
-    assert call([*words, "--camera-out", str(folder / "found.json")]) == 0
+    assert call([*words, "--camera-out", str(folder / "found.json"), "--plot", str(folder / "left.png")]) == 0
+    assert cv2.imread(str(folder / "left.png")).shape[1] > 1000
     found = tomllib.loads((folder / "pose.toml").read_text())
     values = (*truth.position_table_m, truth.yaw_rad, truth.tilt_x_rad, truth.tilt_y_rad)
     for name, value in zip(("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad"), values, strict=True):
