@@ -46,8 +46,11 @@ class Survey:
         """The star list's text: ``id,x_m,y_m,std_x_m,std_y_m,times_seen``."""
         sky = self.sky
         lines = ["id,x_m,y_m,std_x_m,std_y_m,times_seen"]
-        for name, at, std, seen in zip(sky.ids, sky.star_m, sky.std_m, sky.times_seen, strict=True):
-            lines.append(f"{name},{at[0]:.6f},{at[1]:.6f},{std[0]:.2e},{std[1]:.2e},{seen}")
+        for row in np.argsort(np.asarray(sky.ids, dtype=object), kind="stable"):
+            at, std = sky.star_m[row], sky.std_m[row]
+            lines.append(
+                f"{sky.ids[row]},{at[0]:.6f},{at[1]:.6f},{std[0]:.2e},{std[1]:.2e},{sky.times_seen[row]}"
+            )
         return "\n".join(lines) + "\n"
 
 

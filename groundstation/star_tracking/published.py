@@ -89,10 +89,14 @@ class PublishedTracker:
         heading = float(np.angle(middle)) + float(np.median(offsets)) - self._image_turn_rad
         turn = np.exp(1j * heading)
         origin = complex(place[0], place[1]) - turn * self._q_centre_m
-        maps = len(centre)
+        # The publication gives no covariance. Maps that share stars err alike: their scatter is divided by
+        # the stars' number; that of a few maps tells little, so it is mixed with what the method lets pass.
+        maps, stars = len(centre), len(np.unique(star))
+        mixed = (maps - 1 + MIN_CLUSTER) * stars
+        passed_m2 = (0.25 * CLUSTER_RADIUS_M) ** 2
         cov = np.zeros((3, 3))
-        cov[:2, :2] = np.cov(centre.T) / maps + 1e-10 * np.eye(2)
-        cov[2, 2] = float(np.var(offsets)) / maps + 1e-10
+        cov[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
+        cov[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
         star, first = np.unique(star, return_index=True)
         return StarFix(
             x_m=float(origin.real),
