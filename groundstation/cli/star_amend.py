@@ -33,8 +33,9 @@ def amend(
         int, typer.Option(help="Add lights that were seen so often at one place.", min=1)
     ] = 50,
 ) -> None:
-    """Strike dead stars off a star list, put moved ones to their new places and add new lights.
+    """Bring a star list up to date from a flight.
 
+    Dead stars are struck off, moved ones put to their new places, new lights added.
     What the watchdog of the sky found while flying is applied; the last word on each star counts.
 
     Example:

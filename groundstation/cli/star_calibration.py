@@ -63,7 +63,9 @@ def mount(
         float | None, typer.Option(help="True heading of the first frame; it gives the mount's yaw.")
     ] = None,
 ) -> None:
-    """Calibrate the camera's mount (offset, tilt, yaw) from frames made by turning in place.
+    """Calibrate offset, tilt and yaw of the camera.
+
+    The frames are made by turning the mock-up in place.
 
     Example:
       groundstation star-tracker mount recordings/turn --out mount.toml --first-heading-deg 90
@@ -93,7 +95,9 @@ def board(
     camera_out: CameraOut = None,
     plot: Plot = None,
 ) -> None:
-    """Calibrate the lens from pictures of a chessboard or a ChArUco board.
+    """Calibrate the lens by pictures of a board.
+
+    A chessboard or a ChArUco board, seen at many angles all over the picture.
 
     Example:
       groundstation star-tracker board recordings/board --squares 9x6 --square-mm 30 --out lens.toml
@@ -125,8 +129,9 @@ def delay(
     vehicle: Annotated[str | None, typer.Option(help="Whose, if the recording holds several.")] = None,
     plot: Plot = None,
 ) -> None:
-    """Calibrate the camera's delay by laying star headings on the integrated turn rate.
+    """Calibrate the camera's delay against the IMU.
 
+    Star headings are laid on the integrated turn rate.
     The mock-up must turn to and fro. imu.csv needs t_s,omega_rad_s; stars.csv t_arrival_s,heading_rad.
     The rig reads the result: delay_file = "delay.toml" in its star_camera section.
 

@@ -58,8 +58,9 @@ def overhead(
     folder: Annotated[Path, typer.Argument(help="With camera.json, mock_ups.toml and frames/ in colour.")],
     out: Annotated[Path, typer.Option(help="CSV to write, one row per frame and mock-up.")],
 ) -> None:
-    """Find the mock-ups in pictures of the camera over the table, each picture on its own.
+    """Find mock-ups in pictures taken from above.
 
+    Each picture is looked at on its own.
     mock_ups.toml says which coloured circles each mock-up wears, camera.json is that of the camera over the
     table; ms is the CPU time of the whole picture.
 
@@ -114,8 +115,9 @@ def overhead_pose(
     tape_mm: Annotated[float, typer.Option(help="How well places were measured.", min=0.01)] = 2.0,
     tape_deg: Annotated[float, typer.Option(help="How well headings were.", min=1e-3)] = 0.2,
 ) -> None:
-    """Find where the camera over the table hangs, from a ChArUco board that lies on the table.
+    """Find where the camera over the table hangs.
 
+    The pictures show a ChArUco board that lies on the table.
     places.csv has the columns frame,x_m,y_m,heading_deg: where the print's upper left corner lies in the
     table's coordinates, and where its long edge points. One place is enough; several check the tape.
 

@@ -39,9 +39,10 @@ def survey(
         bool, typer.Option("--lens", help="Calibrate the lens from the same sweep (write --camera-out).")
     ] = False,
 ) -> None:
-    """Make the star catalogue from the overlapping frames of a sweep.
+    """Make the star catalogue from a sweep.
 
-    Two anchors or more (anchors.csv: id,x_m,y_m,frame,u,v) fix the frame of the table.
+    The sweep's frames overlap. Two anchors or more (anchors.csv: id,x_m,y_m,frame,u,v)
+    fix the frame of the table.
 
     Example:
       groundstation star-tracker survey recordings/sweep --out ceiling.csv --plot ceiling.png

@@ -52,16 +52,6 @@ COLUMNS = (
 )
 
 
-app.command()(star_calibration.intrinsics)
-app.command()(star_calibration.board)
-app.command()(star_calibration.mount)
-app.command()(star_calibration.delay)
-app.command()(star_survey.survey)
-app.command()(star_amend.amend)
-app.command()(star_overhead.overhead)
-app.command("overhead-pose")(star_overhead.overhead_pose)
-
-
 class Method(StrEnum):
     """Which star identification."""
 
@@ -74,7 +64,6 @@ def _root() -> None:
     """Star fixes from pictures of a ceiling of LEDs, and the calibrations of that sky."""
 
 
-@app.command()
 def solve(
     folder: Annotated[Path, typer.Argument(help="With ceiling.csv, camera.json and frames/.")],
     out: Annotated[Path, typer.Option(help="CSV to write, one row per frame.")],
@@ -160,3 +149,14 @@ def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
         *(f"{value:.3e}" for value in spread),
         "",
     ]
+
+
+app.command()(solve)
+app.command()(star_calibration.intrinsics)
+app.command()(star_calibration.board)
+app.command()(star_calibration.mount)
+app.command()(star_calibration.delay)
+app.command()(star_survey.survey)
+app.command()(star_amend.amend)
+app.command()(star_overhead.overhead)
+app.command("overhead-pose")(star_overhead.overhead_pose)
