@@ -71,13 +71,19 @@ def line_of(vehicle: VehicleMonitor, now_ns: int) -> str:
     used, refused = (0, 0) if fusion is None else (fusion.fixes_used, fusion.fixes_refused)
     return (
         f"{'-' if phase is None else phase.phase:<16} {'-' if command is None else command.gate:<8} "
-        f"{x:8.1f} {y:8.1f} mm {heading:7.2f} deg  "
-        f"off {off_m * 1e3:6.1f} mm {math.degrees(off_rad):6.2f} deg  "
-        f"est {estimate_m * 1e3:5.2f} mm {math.degrees(estimate_rad):5.3f} deg  "
+        f"{_figure(x, 8, 1)} {_figure(y, 8, 1)} mm {_figure(heading, 7, 2)} deg  "
+        f"off {_figure(off_m * 1e3, 6, 1)} mm {_figure(math.degrees(off_rad), 6, 2)} deg  "
+        f"est {_figure(estimate_m * 1e3, 5, 2)} mm {_figure(math.degrees(estimate_rad), 5, 3)} deg  "
         f"imu {vehicle.rate_hz(m.Imu, now_ns):3.0f}/s lost {0 if imu is None else imu.frames_lost}  "
-        f"fix {vehicle.rate_hz(m.StarFix, now_ns):4.1f}/s age {age_s:.2f} s used {used} refused {refused}"
+        f"fix {vehicle.rate_hz(m.StarFix, now_ns):4.1f}/s age {_figure(age_s, 4, 2)} s "
+        f"used {used} refused {refused}"
         f"{_no_fix(vehicle)}"
     )
+
+
+def _figure(value: float, width: int, digits: int) -> str:
+    """A number of fixed width; a dash while there is none."""
+    return f"{value:{width}.{digits}f}" if math.isfinite(value) else f"{'-':>{width}}"
 
 
 def _no_fix(vehicle: VehicleMonitor) -> str:

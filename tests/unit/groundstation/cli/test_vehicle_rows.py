@@ -64,3 +64,10 @@ def test_changes_of_the_sky_are_said_with_what_follows(monitor, change, star, wo
     tell(monitor, m.SkyChange(SECOND_NS, "alpha", change, star, 1.0, 2.0, (1e-8, 0.0, 1e-8), 25))
     (line,) = monitor.take_lines()
     assert words in line
+
+
+def test_what_is_not_known_yet_is_a_dash(monitor):
+    line = line_of(monitor.vehicles["alpha"], 0)
+    assert "nan" not in line
+    assert "inf" not in line
+    assert "age    - s" in line
