@@ -5,7 +5,6 @@ the vehicle's. The mount is ``body_from_camera = Rz(yaw) Rx(tilt_x) Ry(tilt_y)``
 the camera axes in the body frame: looking up with image right along body x.
 """
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.camera.camera_file import read_camera_file, turned_axes
 from calibration.camera.errors import CalibrationFileError
 
 _SCALARS = (
@@ -82,13 +82,7 @@ class CameraCalibration:
 
     def body_from_camera(self) -> NDArray[np.float64]:
         """Rotation matrix (3, 3): columns are the camera axes in the body frame."""
-        cz, sz = math.cos(self.mount_yaw_rad), math.sin(self.mount_yaw_rad)
-        cx, sx = math.cos(self.mount_tilt_x_rad), math.sin(self.mount_tilt_x_rad)
-        cy, sy = math.cos(self.mount_tilt_y_rad), math.sin(self.mount_tilt_y_rad)
-        about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-        about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-        about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-        return np.asarray(about_z @ about_x @ about_y)
+        return turned_axes(self.mount_yaw_rad, self.mount_tilt_x_rad, self.mount_tilt_y_rad)
 
     @classmethod
     def load(cls, path: Path | str) -> "CameraCalibration":
@@ -98,18 +92,7 @@ class CameraCalibration:
             CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
         """
         path = Path(path)
-        try:
-            text = path.read_text(encoding="utf-8")
-        except OSError as error:
-            raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-        except UnicodeDecodeError as error:
-            raise CalibrationFileError(f"{path}: is not a text file.") from error
-        try:
-            data = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise CalibrationFileError(f"{path}: line {error.lineno} is no JSON ({error.msg}).") from error
-        if not isinstance(data, dict):
-            raise CalibrationFileError(f"{path}: expected a JSON object with the camera's keys.")
+        data = read_camera_file(path)
         try:
             return cls.from_mapping(data)
         except ValueError as error:

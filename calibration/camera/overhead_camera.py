@@ -1,6 +1,5 @@
 """The camera over the table that looks down: lens, place and attitude, read from its JSON file."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.camera.camera_file import read_camera_file, turned_axes
 from calibration.camera.errors import CalibrationFileError
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
@@ -66,13 +66,7 @@ class OverheadCamera:
 
         D = diag(1, -1, -1) is the level camera: picture's right along +x, picture's down along -y.
         """
-        cz, sz = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        cx, sx = math.cos(self.tilt_x_rad), math.sin(self.tilt_x_rad)
-        cy, sy = math.cos(self.tilt_y_rad), math.sin(self.tilt_y_rad)
-        about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-        about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-        about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-        return np.asarray(about_z @ about_x @ about_y @ _DOWN)
+        return np.asarray(turned_axes(self.yaw_rad, self.tilt_x_rad, self.tilt_y_rad) @ _DOWN)
 
     @classmethod
     def load(cls, path: Path | str) -> "OverheadCamera":
@@ -82,14 +76,7 @@ class OverheadCamera:
             CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
         """
         path = Path(path)
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-        except ValueError as error:
-            raise CalibrationFileError(f"{path}: is no JSON file ({error}).") from error
-        if not isinstance(data, dict):
-            raise CalibrationFileError(f"{path}: expected a JSON object with the camera's keys.")
+        data = read_camera_file(path)
         try:
             return cls.from_mapping(data)
         except ValueError as error:

@@ -73,10 +73,8 @@ class ImuPort(PortTranslation):
 
 
 @dataclass(frozen=True)
-class StarCameraPort(PortTranslation):
-    """A star camera: the stamp of a frame is the middle of its exposure."""
-
-    reads = m.StarImage
+class CameraPort(PortTranslation):
+    """A camera: the stamp of a frame is the middle of its exposure, and only the newest frame counts."""
 
     delay: ExposureDelay
     timeout_s: float
@@ -84,6 +82,13 @@ class StarCameraPort(PortTranslation):
     @property
     def delivery(self) -> Delivery:
         return Delivery.NEWEST
+
+
+@dataclass(frozen=True)
+class StarCameraPort(CameraPort):
+    """A star camera: grey frames."""
+
+    reads = m.StarImage
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, CameraFrame)
@@ -93,17 +98,10 @@ class StarCameraPort(PortTranslation):
 
 
 @dataclass(frozen=True)
-class OverheadCameraPort(PortTranslation):
-    """The camera over the table: colour frames, stamped in the middle of their exposure."""
+class OverheadCameraPort(CameraPort):
+    """The camera over the table: colour frames, of no vehicle."""
 
     reads = m.OverheadImage
-
-    delay: ExposureDelay
-    timeout_s: float
-
-    @property
-    def delivery(self) -> Delivery:
-        return Delivery.NEWEST
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, CameraFrame)
