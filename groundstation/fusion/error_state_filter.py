@@ -21,6 +21,7 @@ from groundstation.fusion.carrier import Carrier
 from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S, FirstFixes
 from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.force_doubt import ForceDoubt
 from groundstation.fusion.late_fix import LateFix
@@ -42,9 +43,6 @@ the filter is lost."""
 LOOK_NS = 1_000_000_000
 """While no fix comes, how long the local slope is taken to be what it was."""
 WAITS = "waits for packets"
-CANDIDATE = "waits for a second fix"
-CANDIDATE_AGE_S = 5.0
-"""A first fix is compared with those up to this long after it."""
 
 
 class ErrorStateFilter:
@@ -78,7 +76,7 @@ class ErrorStateFilter:
         self._reckoner = make_reckoner(noise, self.counters, table_map, core)
         self._carrier = Carrier(noise, table_map, core)
         self._late_fix = LateFix(noise, core)
-        self._candidates: list[Fix] = []
+        self._first_fixes = FirstFixes()
         self._past = PastFixes()
         self._rests = Rests()
         self._refused: list[tuple[float, Array]] = []
@@ -194,7 +192,7 @@ class ErrorStateFilter:
             return _account(fix, WAITS)
         self._past.meet(fix.source)
         if not reckoner.has_pose:
-            return self._consider(fix, t)
+            return self._consider(fix)
         if t <= reckoner.checkpoint_s:
             return self._insert(fix, t)
         return self._correct(fix, t)
@@ -260,23 +258,14 @@ class ErrorStateFilter:
                 return self._restart(fix, t, z, nis)
         return _account(fix, "outside the gate", z, nis)
 
-    def _consider(self, fix: Fix, t: float) -> FixAccount:
+    def _consider(self, fix: Fix) -> FixAccount:
         """Start from the first two fixes that agree; one alone may be wrong."""
-        for first in reversed(self._candidates):
-            if self._agree(first, fix):
-                self._start(first)
-                for other in self._candidates:
-                    used = other is first
-                    reason = "starts the estimate" if used else "no second fix agreed"
-                    self._accounts.append(_account(other, reason, used=used))
-                self._candidates.clear()
-                return self._judge(fix)
-        limit_ns = fix.t_exposure_ns - int(CANDIDATE_AGE_S * 1e9)
-        for old in [c for c in self._candidates if c.t_exposure_ns < limit_ns]:
-            self._accounts.append(_account(old, "no second fix agreed"))
-            self._candidates.remove(old)
-        self._candidates.append(fix)
-        return _account(fix, CANDIDATE)
+        first, settled = self._first_fixes.consider(fix, self._agree)
+        self._accounts += [_account(old, reason, used=old is first) for old, reason in settled]
+        if first is None:
+            return _account(fix, CANDIDATE)
+        self._start(first)
+        return self._judge(fix)
 
     def _agree(self, first: Fix, second: Fix) -> bool:
         """Whether one vehicle may have been seen at both poses."""

@@ -7,9 +7,10 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.frames import wrap_angle
-from groundstation.fusion.error_state_filter import CANDIDATE, CANDIDATE_AGE_S, WAITS
+from groundstation.fusion.error_state_filter import WAITS
 from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
+from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import (
     Diagnostics,
