@@ -89,11 +89,11 @@ class LiveCamera:
                 self._changed.wait_for(lambda: bool(self._orders))
                 now_ns = time.monotonic_ns()
                 while len(self._orders) > 1 and self._orders[0].arrival_ns < now_ns:
-                    self._orders.popleft()  # too slow a machine misses pictures; late ones lie of their age
+                    self._orders.popleft()  # too slow a machine misses pictures, not the present
                 exposure = self._orders.popleft()
             image = self._render(exposure)
-            # real time is this process's work: a frame leaves when a camera would have sent it
-            time.sleep(max(0, exposure.arrival_ns - time.monotonic_ns()) / NS_PER_S)
+            wait_ns = max(0, exposure.arrival_ns - time.monotonic_ns())
+            time.sleep(wait_ns / NS_PER_S)  # real time: a frame leaves when a camera would have sent it
             with self._changed:
                 self._newest = (exposure.sequence, exposure.arrival_ns, image)
                 self._published += 1

@@ -208,7 +208,7 @@ def nothing_left():
     def check(pids):
         until_s = time.monotonic() + 4.0
         while time.monotonic() < until_s and any(state_of(pid) for pid in pids):
-            time.sleep(0.05)  # of the world outside: nobody tells us
+            time.sleep(0.05)  # the kernel tells nobody but the parent that a process is gone: ask again
         assert not [words_of(pid) for pid in pids if state_of(pid)]
         return before
 

@@ -20,4 +20,4 @@ def compiled_core(request, tmp_path_factory):
     try:
         return load_core(compile_core(tmp_path_factory.mktemp("core") / "core.so"))
     except CoreBuildError as error:
-        pytest.skip(f"no compiled core to test: {error}")
+        pytest.skip(f"no compiled core to test: {error}")  # no compiler: the NumPy code is what runs there

@@ -22,7 +22,7 @@ def test_no_wrong_memory_and_no_undefined_arithmetic(tmp_path: Path) -> None:
     try:
         library = compile_core(tmp_path / "core.so", SANITIZERS)
     except CoreBuildError as error:
-        pytest.skip(f"no sanitizers here: {error}")
+        pytest.skip(f"no sanitizers here: {error}")  # they come with the compiler, not with us
     # Other extensions throw C++ exceptions, which the sanitizer has to know from the beginning.
     preload = " ".join(_compiler_file(name) for name in ("libasan.so", "libstdc++.so.6"))
     run = subprocess.run(
