@@ -148,9 +148,7 @@ class PortThread(threading.Thread):
                 if not self._closing.is_set():
                     sentence = f"{self.port.channel}: {error}; next try in {self._wait_s:.1f} s"
                     self._trouble(self.port.channel, ERROR, sentence)
-            except (
-                Exception
-            ) as error:  # a bug: the loop raises it, else the thread would die unseen
+            except Exception as error:  # a bug: the loop raises it, else the thread would die unseen
                 self._crash(error)
                 return
             finally:
