@@ -5,14 +5,15 @@ Layouts are compiled once per class (``cdr_fields``); the header and the fixed f
 Source: OMG DDS-XTypes 1.3, section 7.4.1 (plain CDR); ROS 2 uses it with representation id 0x0001.
 """
 
+import functools
 import struct
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from groundstation.messages.base import Message
-from groundstation.messages.cdr_fields import Part, Run, parts, ros_fields
+from groundstation.declarations.message import Message
+from groundstation.bus.cdr_fields import Part, Run, parts, ros_fields
 
-__all__ = ["ENCAPSULATION", "Codec", "CodecError", "ros_fields"]
+__all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields"]
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
@@ -90,3 +91,9 @@ class Codec(Generic[M]):
         layout = self._first.layout(12 + length)
         compiled = self._openings[length] = struct.Struct(f"<4siII{length}s{layout}")
         return compiled
+
+
+@functools.cache
+def codec_of(cls: type[M]) -> Codec[M]:
+    """The codec of a class, compiled at the first call."""
+    return Codec(cls)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
-from groundstation.messages.base import Message
+from groundstation.declarations.message import Message
 
 _PRIMITIVES = {
     "bool": ("?", 1),

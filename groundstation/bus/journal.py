@@ -1,24 +1,47 @@
-"""The journal: what each node consumed and said, in the order only its runner knows.
+"""The journal: what each node consumed and published, in the order only its runner knows.
 
-Replay follows it. A process packs entries of fixed size and publishes them as ``Journal`` payloads;
-an entry is read against the names (nodes and owners) that stand in the same payload.
+Replay follows it. A process packs entries of fixed size and publishes them as ``Journal`` payloads; an entry
+is read against the names (nodes, nouns and owners) that stand in the same payload.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.declarations.message import PACKAGE, Bytes, Message, Text, TextSequence
+from groundstation.declarations.topic import Scope, Topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Journal(Message):
+    """What one process consumed and published, in order: packed entries of ``bus.journal``.
+
+    Attributes:
+        process: Its name.
+        names: What the entries point into.
+        entries: Packed, see ``ENTRY``.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Journal"
+    TOPIC: ClassVar = Topic("journal", 10, scope=Scope.PROCESS)
+    process: Text
+    names: TextSequence
+    entries: Bytes
 
 
 class Kind(IntEnum):
     """What happened."""
 
-    START = 0  # topic 0; sequence is a CRC-32 of configuration and calibration
-    INPUT = 1  # the node consumed (topic, owner, sequence)
+    START = 0  # sequence is a CRC-32 of configuration and calibration
+    INPUT = 1  # the node consumed (noun, owner, sequence)
     TICK = 2  # the node was ticked
-    OUTPUT = 3  # the node said (topic, owner, sequence)
-    DROP = 4  # (topic, owner, sequence) was replaced by a newer one before the node took it
-    PORT = 5  # a port of the process turned something outside into (topic, owner, sequence)
+    OUTPUT = 3  # the node published (noun, owner, sequence)
+    DROP = 4  # (noun, owner, sequence) was replaced by a newer one before the node took it
+    PORT = 5  # a port of the process turned something outside into (noun, owner, sequence)
     STOP = 6  # the node was told that its process ends
 
 
@@ -26,16 +49,38 @@ ENTRY = np.dtype(
     [
         ("now_ns", "<i8"),
         ("sequence", "<u4"),
-        ("kind", "u1"),
-        ("topic", "u1"),
-        ("node", "<u2"),  # index in names; 0xFFFF for PORT
-        ("owner", "<u2"),  # index in names
-        ("_pad", "<u2"),
         ("wall_ns", "<u4"),
+        ("kind", "u1"),
+        ("_pad", "u1"),
+        ("node", "<u2"),  # index in names; 0xFFFF for PORT
+        ("noun", "<u2"),  # index in names
+        ("owner", "<u2"),  # index in names
     ]
 )
 NO_NODE = 0xFFFF
 _LONGEST_NS = 0xFFFFFFFF
+
+
+class Entry(NamedTuple):
+    """One entry, read back.
+
+    Attributes:
+        now_ns: The moment the node was told.
+        kind: What happened.
+        node: Key of the node, empty for a port.
+        noun: Of the topic, empty where there is none.
+        owner: Of the topic.
+        sequence: Of the message.
+        wall_ns: Time it took, 0 in lockstep.
+    """
+
+    now_ns: int
+    kind: int
+    node: str
+    noun: str
+    owner: str
+    sequence: int
+    wall_ns: int
 
 
 class JournalWriter:
@@ -52,7 +97,7 @@ class JournalWriter:
         self,
         kind: Kind,
         node: str | None,
-        topic: int,
+        noun: str,
         owner: str,
         sequence: int,
         now_ns: int,
@@ -63,7 +108,7 @@ class JournalWriter:
         Args:
             kind: What happened.
             node: Its key, ``name`` or ``vehicle/name``; None for a port.
-            topic: Index of the topic's row.
+            noun: Of the topic, empty where there is none.
             owner: Vehicle or process of the topic.
             sequence: Of the message.
             now_ns: The moment the node was told.
@@ -71,10 +116,11 @@ class JournalWriter:
         """
         names = self._names
         node_index = NO_NODE if node is None else names.setdefault(node, len(names))
+        noun_index = names.setdefault(noun, len(names))
         owner_index = names.setdefault(owner, len(names))
         if wall_ns > _LONGEST_NS:
             wall_ns = _LONGEST_NS
-        self._rows.append((now_ns, sequence, kind, topic, node_index, owner_index, 0, wall_ns))
+        self._rows.append((now_ns, sequence, wall_ns, kind, 0, node_index, noun_index, owner_index))
 
     def take(self) -> tuple[tuple[str, ...], bytes]:
         """Names and packed entries since the last call."""
@@ -90,7 +136,7 @@ class NoJournal(JournalWriter):
         self,
         kind: Kind,
         node: str | None,
-        topic: int,
+        noun: str,
         owner: str,
         sequence: int,
         now_ns: int,
@@ -99,6 +145,14 @@ class NoJournal(JournalWriter):
         """Forget."""
 
 
-def read_entries(data: bytes) -> NDArray[np.void]:
-    """Entries of one ``Journal`` payload, shape (n,), dtype ``ENTRY``."""
-    return np.frombuffer(data, dtype=ENTRY)
+def packed_entries(journal: Journal) -> NDArray[np.void]:
+    """Entries as they are packed, shape (n,), dtype ``ENTRY``."""
+    return np.frombuffer(journal.entries, dtype=ENTRY)
+
+
+def read_entries(journal: Journal) -> Iterator[Entry]:
+    """Entries of one payload, in order."""
+    names = journal.names
+    for now_ns, sequence, wall_ns, kind, _, node, noun, owner in packed_entries(journal).tolist():
+        key = "" if node == NO_NODE else names[node]
+        yield Entry(now_ns, kind, key, names[noun], names[owner], sequence, wall_ns)

@@ -2,11 +2,12 @@
 
 What this module fixes once, so that nobody else meets it: no scouting, no listening beyond loopback,
 no shared memory, callbacks that only append to a queue, BLOCK for what may not be lost and DROP for
-what is replaced by the next, commands on a priority of their own, and a session that is closed by a
-context manager, since a living subscriber keeps the interpreter from ending.
+what is replaced by the next, and a session that is closed by a context manager, since a living subscriber
+keeps the interpreter from ending.
 
-Keys are ``<owner>/<noun>``; the envelope travels as the attachment. Latched topics are repeated by
-their publisher with the same sequence number; receivers drop what they have seen.
+Two planes. ``<owner>/<noun>`` carries a topic at once, for the processes that wait for it and for whoever
+else subscribes to it; ``record/<process>`` carries everything that a process published, in batches.
+Latched topics are repeated by their publisher with the same sequence number.
 """
 
 import json
@@ -16,11 +17,11 @@ from typing import Self
 
 import zenoh
 
-from groundstation.bus.envelope import Envelope
-from groundstation.bus.topics import Delivery, Topic
+from groundstation.declarations.topic import Delivery, Topic
 
 RIG_OWNER = "rig"
 ALIVE = "alive"
+RECORD = "record"
 LEASE_MS = 2000
 
 Receive = Callable[[str, bytes, bytes], None]
@@ -62,6 +63,40 @@ def split_key(key: str) -> tuple[str, str]:
     return ("" if owner == RIG_OWNER else owner), noun
 
 
+class TopicPublisher:
+    """Publishes one topic of one owner on its own key, to whoever subscribes.
+
+    Attributes:
+        is_wanted: Whether somebody subscribes, or another process of the rig waits for it anyhow.
+    """
+
+    def __init__(self, session: zenoh.Session, key: str, topic: Topic, *, always: bool) -> None:
+        newest = topic.delivery is Delivery.NEWEST
+        self._publisher = session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.DROP if newest else zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH,
+            express=not newest,
+        )
+        self.is_wanted = always
+        self._listener = None if always else self._publisher.declare_matching_listener(self._match)
+        if self._listener is not None and self._publisher.matching_status.matching:
+            self.is_wanted = True
+
+    def _match(self, status: zenoh.MatchingStatus) -> None:
+        self.is_wanted = status.matching
+
+    def put(self, encoded: bytes, attachment: bytes) -> None:
+        """Send one encoded payload."""
+        self._publisher.put(encoded, attachment=attachment)
+
+    def close(self) -> None:
+        """Stop listening for subscribers."""
+        if self._listener is not None:
+            self._listener.undeclare()
+            self._listener = None
+
+
 class ZenohBus:
     """A process's session with the hub; use it as a context manager.
 
@@ -74,7 +109,8 @@ class ZenohBus:
 
     def __init__(self, endpoint: str) -> None:
         self._session = zenoh.open(_config("client", connect=(endpoint,)))
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._publishers: list[TopicPublisher] = []
+        self._record: zenoh.Publisher | None = None
         self._subscribers: list[zenoh.Subscriber[None]] = []
         self._token: zenoh.LivelinessToken | None = None
 
@@ -86,32 +122,41 @@ class ZenohBus:
     ) -> None:
         self.close()
 
-    def publish(self, envelope: Envelope, encoded: bytes) -> None:
-        """Send one encoded payload with its envelope."""
-        key = key_of(envelope.topic, envelope.vehicle)
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            publisher = self._publishers[key] = self._declare(key, envelope.topic)
-        publisher.put(encoded, attachment=envelope.pack())
+    def publisher(self, topic: Topic, owner: str, *, always: bool = False) -> TopicPublisher:
+        """A publisher of a topic of an owner.
 
-    def _declare(self, key: str, topic: Topic) -> zenoh.Publisher:
-        newest = topic.delivery is Delivery.NEWEST
-        return self._session.declare_publisher(
-            key,
-            congestion_control=zenoh.CongestionControl.DROP if newest else zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH,
-            express=not newest,
-        )
+        Args:
+            topic: The topic.
+            owner: Vehicle or process, empty for the rig.
+            always: Publish whether or not a subscriber has been noticed: another process waits for it.
+        """
+        made = TopicPublisher(self._session, key_of(topic, owner), topic, always=always)
+        self._publishers.append(made)
+        return made
+
+    def publish_batch(self, process: str, batch: bytes) -> None:
+        """Send a batch of the record stream; blocks while the hub does not take it."""
+        if self._record is None:
+            self._record = self._session.declare_publisher(
+                f"{RECORD}/{process}",
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.DATA,
+                express=True,
+            )
+        self._record.put(batch)
 
     def subscribe(self, key_expression: str, receive: Receive) -> None:
-        """Hear everything under a key expression; ``receive`` runs on Zenoh's thread."""
+        """Receive everything under a key expression; ``receive`` runs on Zenoh's thread."""
 
-        def hear(sample: zenoh.Sample) -> None:
+        def take(sample: zenoh.Sample) -> None:
             attachment = sample.attachment
-            if attachment is not None:
-                receive(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes())
+            receive(
+                str(sample.key_expr),
+                sample.payload.to_bytes(),
+                b"" if attachment is None else attachment.to_bytes(),
+            )
 
-        self._subscribers.append(self._session.declare_subscriber(key_expression, hear))
+        self._subscribers.append(self._session.declare_subscriber(key_expression, take))
 
     def announce(self, process: str) -> None:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""
@@ -120,16 +165,19 @@ class ZenohBus:
     def watch(self, told: Callable[[str, bool], None]) -> None:
         """Be told of every process that becomes ready or goes; runs on Zenoh's thread."""
 
-        def hear(sample: zenoh.Sample) -> None:
+        def take(sample: zenoh.Sample) -> None:
             process = str(sample.key_expr).rpartition("/")[2]
             told(process, sample.kind == zenoh.SampleKind.PUT)
 
         self._subscribers.append(
-            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", hear, history=True)
+            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", take, history=True)
         )
 
     def close(self) -> None:
         """Withdraw everything and end the session; may be called twice."""
+        for publisher in self._publishers:
+            publisher.close()
+        self._publishers.clear()
         for subscriber in self._subscribers:
             subscriber.undeclare()
         self._subscribers.clear()

@@ -14,6 +14,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.declarations.topic import Topic
+
 PACKAGE = "air_table_msgs"
 """ROS 2 package of our own message types."""
 
@@ -40,11 +42,12 @@ class Message:
     """What every payload carries.
 
     Attributes:
-        stamp_ns: The moment the payload speaks of, host monotonic clock, int64 nanoseconds.
+        stamp_ns: The moment that the payload is about, host monotonic clock, int64 nanoseconds.
         vehicle: Name of the mock-up, empty where the payload belongs to the whole rig.
     """
 
     ROS_TYPE: ClassVar[str] = ""
+    TOPIC: ClassVar[Topic]
 
     stamp_ns: int
     vehicle: str

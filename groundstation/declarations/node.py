@@ -1,23 +1,28 @@
-"""What a node is: a pure transformer with state.
+"""What a node is: a pure transformer with state, and its row in a part.
 
-It names what it hears and says, is told the time, and returns messages. Three runners execute the
-same object: live, lockstep and replay. ``now_ns`` is the moment at which the runner hands over a
-message (its arrival); runners write it into the journal, so that a replay tells the same moments.
+It names its input and output topics, is told the time, and returns messages. Three runners execute the
+same object: live, lockstep and replay. ``now_ns`` is the moment at which the runner delivers a message (its
+arrival); runners write it into the journal, so that a replay tells the same moments.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import Enum, auto
 from typing import ClassVar
 
-from groundstation.messages.base import Message
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
 
 
 class Node(ABC):
     """Base of all nodes.
 
     Class attributes:
-        inputs: Payload classes it hears.
-        outputs: Payload classes it may say; the runner refuses others.
+        inputs: Payload classes it receives.
+        outputs: Payload classes it may publish; the runner refuses others.
+        trigger: What a message that is made in a tick was made from: the newest of this input. None
+            where ticks report on the node itself.
 
     Attributes:
         vehicle: Whose it is, empty for a node of the whole rig.
@@ -26,18 +31,19 @@ class Node(ABC):
 
     inputs: ClassVar[tuple[type[Message], ...]] = ()
     outputs: ClassVar[tuple[type[Message], ...]] = ()
+    trigger: ClassVar[type[Message] | None] = None
 
     def __init__(self, vehicle: str, tick_period_ns: int = 0) -> None:
         self.vehicle = vehicle
         self.tick_period_ns = tick_period_ns
 
-    def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
-        """Vehicles whose ``payload`` topic this node hears; its own unless a node says otherwise."""
+    def sources(self, payload: type[Message]) -> tuple[str, ...]:
+        """Vehicles whose ``payload`` topic this node receives; its own unless a node says otherwise."""
         del payload
         return (self.vehicle,)
 
     def start(self, now_ns: int) -> Iterable[Message]:
-        """Messages to say before anything is heard, e.g. latched calibrations."""
+        """Messages to publish before anything is received, e.g. latched calibrations."""
         del now_ns
         return ()
 
@@ -51,6 +57,55 @@ class Node(ABC):
         return ()
 
     def stop(self, now_ns: int) -> Iterable[Message]:
-        """The process ends in good order; last words, e.g. closed valves."""
+        """The process ends in good order; last messages, e.g. closed valves."""
         del now_ns
         return ()
+
+
+class Weight(Enum):
+    """What a node may share a process with."""
+
+    HEAVY = auto()  # never with an urgent node
+    LIGHT = auto()
+    URGENT = auto()  # IMU, fusion, valves: never with a heavy node
+
+
+FLIGHT, SKY, COMMANDS, STATION = "{vehicle}_flight", "{vehicle}_sky", "commands", "station"
+"""The usual processes."""
+
+
+def always(rig: Rig, vehicle: str) -> bool:
+    """Every vehicle has it."""
+    del rig, vehicle
+    return True
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRow:
+    """A node as its part declares it.
+
+    Attributes:
+        name: As in rig files, journals and health.
+        process: Default process; ``{vehicle}`` is filled in.
+        weight: What it may share a process with.
+        make: Builds it from the rig for a vehicle.
+        condition: Whether a vehicle has it.
+        is_of_rig: One for the whole rig instead of one per vehicle; its vehicle is empty.
+    """
+
+    name: str
+    process: str
+    weight: Weight
+    make: Callable[[Rig, str], Node]
+    condition: Callable[[Rig, str], bool] = always
+    is_of_rig: bool = False
+
+    def vehicles(self, rig: Rig) -> list[str]:
+        """Vehicles that have this node; one empty name for a node of the rig."""
+        if self.is_of_rig:
+            return [""] if self.condition(rig, "") else []
+        return [name for name in rig.vehicles if self.condition(rig, name)]
+
+    def key(self, vehicle: str) -> str:
+        """Key of the node in journals: ``vehicle/name``, or ``name`` for a node of the rig."""
+        return f"{vehicle}/{self.name}" if vehicle else self.name

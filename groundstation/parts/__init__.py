@@ -1,1 +1,1 @@
-"""What nodes say to each other: frozen payloads, one class per topic, and their CDR codec."""
+"""The parts of the system: each folder is one part, declared in its ``part.py``."""

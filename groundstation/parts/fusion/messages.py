@@ -1,22 +1,10 @@
-"""What fusion believes, and what the reference system says."""
+"""What fusion believes, and what became of each fix."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import (
-    F64,
-    I64,
-    PACKAGE,
-    U32,
-    Bool,
-    Bytes,
-    Float64x2,
-    Float64x3,
-    Message,
-    Text,
-    TextSequence,
-)
-
+from groundstation.declarations.message import F64, I64, PACKAGE, U32, Bool, Float64x2, Float64x3, Message, Text, TextSequence
+from groundstation.declarations.topic import Rank, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VehicleState(Message):
@@ -33,6 +21,7 @@ class VehicleState(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleState"
+    TOPIC: ClassVar = Topic("state", 100, Rank.ESTIMATE)
     position_table_m: Float64x2
     heading_rad: F64
     velocity_table_m_s: Float64x2
@@ -47,6 +36,7 @@ class FixAccount(Message):
     """What fusion did with one fix of ``stars`` or ``overhead``; the stamp is the fix's exposure."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixAccount"
+    TOPIC: ClassVar = Topic("fix_account", 15, Rank.ESTIMATE)
     source: Text
     used: Bool
     reason: Text
@@ -72,6 +62,7 @@ class FusionStatus(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FusionStatus"
+    TOPIC: ClassVar = Topic("fusion_status", 5, Rank.ESTIMATE)
     status: Text
     method: Text
     bias_rate_rad_s: F64
@@ -94,25 +85,7 @@ class FusionCalibration(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FusionCalibration"
+    TOPIC: ClassVar = Topic("fusion_calibration", latched=True)
     names: TextSequence
     sha256: TextSequence
     contents: TextSequence
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ReferenceBytes(Message):
-    """A read of the reference stream (truth of the emulator, or motion capture)."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ReferenceBytes"
-    data: Bytes
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ReferenceState(Message):
-    """Pose and velocity by the reference system; for view, recorder and report only."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ReferenceState"
-    position_table_m: Float64x2
-    heading_rad: F64
-    velocity_table_m_s: Float64x2
-    rate_rad_s: F64

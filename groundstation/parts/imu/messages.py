@@ -3,27 +3,15 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import (
-    F64,
-    PACKAGE,
-    U8,
-    U16,
-    U32,
-    U64,
-    Bool,
-    Bytes,
-    Float64Sequence,
-    Float64x2,
-    Message,
-    Text,
-)
-
+from groundstation.declarations.message import F64, PACKAGE, U8, U16, U32, U64, Bool, Bytes, Float64Sequence, Float64x2, Message, Text
+from groundstation.declarations.topic import Rank, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImuBytes(Message):
     """A read of the IMU block's serial port; the stamp is the arrival of its last byte."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuBytes"
+    TOPIC: ClassVar = Topic("imu_bytes", 100, Rank.SENSOR)
     data: Bytes
 
 
@@ -32,6 +20,7 @@ class ImuOrder(Message):
     """Bytes for the IMU block (set averaging, self-test, ...), ready to be written."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuOrder"
+    TOPIC: ClassVar = Topic("imu_order", rank=Rank.COMMAND)
     data: Bytes
 
 
@@ -50,6 +39,7 @@ class ImuRaw(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuRaw"
+    TOPIC: ClassVar = Topic("imu_raw", 100, Rank.SENSOR)
     version: U8
     tick_ms: U64
     sample_count: U16
@@ -60,6 +50,8 @@ class ImuRaw(Message):
 
 
 USABLE_RATE, USABLE_FORCE_X, USABLE_FORCE_Y = 1, 2, 4
+
+
 USABLE_ALL = 7
 """Bits of `Imu.usable`."""
 
@@ -83,6 +75,7 @@ class Imu(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuSample"
+    TOPIC: ClassVar = Topic("imu", 100, Rank.SENSOR)
     tick_ms: U64
     elapsed_ms: U32
     window_s: F64

@@ -1,67 +1,17 @@
-"""How a rig is run: requests, modes, calibrations, health, journal, latency."""
+"""How a rig is run: start sequence, calibrations in use, health, latency."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import (
-    PACKAGE,
-    U8,
-    U32,
-    Bool,
-    Bytes,
-    Float64Sequence,
-    Message,
-    Text,
-    TextSequence,
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Request(Message):
-    """Something asked of a vehicle; answered on ``ack``.
-
-    Attributes:
-        request_id: Unique per author.
-        author: Who asks.
-        action: A row of the table of actions: arm, disarm, stop, release, float_on, float_off, go_to, ...
-        argument: Numbers of the action, for ``go_to``: x, y (m), heading (rad).
-    """
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Request"
-    request_id: U32
-    author: Text
-    action: Text
-    argument: Float64Sequence
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ack(Message):
-    """The answer to a request."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Ack"
-    request_id: U32
-    author: Text
-    action: Text
-    accepted: Bool
-    reason: Text
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class VehicleMode(Message):
-    """Armed state and the reason for it; latched."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleMode"
-    armed: Bool
-    stopped: Bool
-    source: Text
-    reason: Text
-
+from groundstation.declarations.message import PACKAGE, U8, Float64Sequence, Message, Text, TextSequence
+from groundstation.declarations.topic import Scope, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequencePhase(Message):
     """Where the start sequence of a mock-up is; latched."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/SequencePhase"
+    TOPIC: ClassVar = Topic("sequence_phase", latched=True)
     phase: Text
     detail: Text
 
@@ -71,6 +21,7 @@ class CalibrationInUse(Message):
     """A calibration file as loaded, with its hash; latched."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CalibrationInUse"
+    TOPIC: ClassVar = Topic("calibration", latched=True)
     name: Text
     sha256: Text
     content: Text
@@ -81,21 +32,12 @@ class Diagnostics(Message):
     """Counters and health of one node, once a second."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Diagnostics"
+    TOPIC: ClassVar = Topic("diagnostics", 1, scope=Scope.PROCESS)
     node: Text
     level: U8
     summary: Text
     keys: TextSequence
     values: TextSequence
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Journal(Message):
-    """What one process consumed and said, in order: packed entries of ``runtime.journal``."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Journal"
-    process: Text
-    names: TextSequence
-    entries: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,6 +51,7 @@ class Latency(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Latency"
+    TOPIC: ClassVar = Topic("latency", 1, observers_only=True)
     stages: TextSequence
     p50_s: Float64Sequence
     p99_s: Float64Sequence

@@ -3,26 +3,22 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import (
-    F64,
-    PACKAGE,
-    U8,
-    U16,
-    U32,
-    Bool,
-    Bytes,
-    Float64x3,
-    Float64x9,
-    Message,
-    Text,
-)
-
+from groundstation.declarations.message import F64, PACKAGE, U8, U16, U32, Bool, Bytes, Float64x3, Float64x9, Message, Text
+from groundstation.declarations.topic import Delivery, Rank, Recorded, Scope, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OverheadImage(Message):
     """One colour frame of the camera over the table; the stamp is the middle of the exposure."""
 
     ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    TOPIC: ClassVar = Topic(
+        "overhead_image",
+        10,
+        Rank.SENSOR,
+        scope=Scope.RIG,
+        delivery=Delivery.NEWEST,
+        recorded=Recorded.IMAGES,
+    )
     height: U32
     width: U32
     encoding: Text
@@ -49,6 +45,7 @@ class OverheadFix(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/OverheadFix"
+    TOPIC: ClassVar = Topic("overhead_fix", 10, Rank.SENSOR)
     fix: Bool
     x_m: F64
     y_m: F64
@@ -78,6 +75,7 @@ class FixComparison(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixComparison"
+    TOPIC: ClassVar = Topic("fix_comparison", 1.5)
     apart_s: F64
     difference: Float64x3
     std: Float64x3

@@ -3,29 +3,15 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import (
-    F64,
-    I64,
-    PACKAGE,
-    U8,
-    U16,
-    U32,
-    Bool,
-    Bytes,
-    Float32Array,
-    Float64x3,
-    Float64x9,
-    Message,
-    Text,
-    TextSequence,
-)
-
+from groundstation.declarations.message import F64, I64, PACKAGE, U8, U16, U32, Bool, Bytes, Float32Array, Float64x3, Float64x9, Message, Text, TextSequence
+from groundstation.declarations.topic import Delivery, Rank, Recorded, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarImage(Message):
     """One grey frame of the star camera; the stamp is the middle of the exposure."""
 
     ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    TOPIC: ClassVar = Topic("star_image", 15, Rank.SENSOR, delivery=Delivery.NEWEST, recorded=Recorded.IMAGES)
     height: U32
     width: U32
     encoding: Text
@@ -55,6 +41,7 @@ class StarSpots(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarSpots"
+    TOPIC: ClassVar = Topic("star_spots", 15, Rank.SENSOR, recorded=Recorded.SPOTS)
     arrival_ns: I64
     u_px: Float32Array
     v_px: Float32Array
@@ -87,6 +74,7 @@ class StarFix(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarFix"
+    TOPIC: ClassVar = Topic("star_fix", 15, Rank.SENSOR)
     fix: Bool
     x_m: F64
     y_m: F64
@@ -103,6 +91,7 @@ class FixBytes(Message):
     """A read of an external pose stream that serves as star fixes."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/FixBytes"
+    TOPIC: ClassVar = Topic("fix_bytes", rank=Rank.SENSOR)
     data: Bytes
 
 
@@ -120,6 +109,7 @@ class SkyChange(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/SkyChange"
+    TOPIC: ClassVar = Topic("sky_change")
     change: Text
     star: Text
     x_m: F64
@@ -149,6 +139,7 @@ class StarMatches(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarMatches"
+    TOPIC: ClassVar = Topic("star_matches")
     reason: Text
     basis: Text
     x_m: F64
@@ -168,5 +159,6 @@ class StarPicture(Message):
     """The picture that a ``StarMatches`` of the same stamp speaks of, compressed without loss."""
 
     ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+    TOPIC: ClassVar = Topic("star_picture", recorded=Recorded.SPOTS)
     format: Text
     data: Bytes

@@ -1,37 +1,13 @@
-"""From the wrench that a controller wants to the frame on the valve bus."""
+"""From the demand for pulses to the frame on the valve bus, and what the valve node reports."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.messages.base import F64, PACKAGE, U8, U32, Bool, Bytes, Float64x2, Message, Text
+from groundstation.declarations.message import F64, PACKAGE, U8, U32, Bool, Bytes, Float64x2, Message, Text
+from groundstation.declarations.topic import Rank, Scope, Topic
 
 NO_STOP = 255
 """Stop reason of a command without a latched stop."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Wrench(Message):
-    """Force and torque asked for by the controller, body frame; z components of the other axes are 0."""
-
-    ROS_TYPE: ClassVar[str] = "geometry_msgs/msg/WrenchStamped"
-    force_x_n: F64
-    force_y_n: F64
-    force_z_n: F64
-    torque_x_nm: F64
-    torque_y_nm: F64
-    torque_z_nm: F64
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ControlStatus(Message):
-    """The goal in force and the distance to it."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ControlStatus"
-    controller: Text
-    goal_position_table_m: Float64x2
-    goal_heading_rad: F64
-    error_position_m: F64
-    error_heading_rad: F64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +21,7 @@ class ValveDemand(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveDemand"
+    TOPIC: ClassVar = Topic("valve_demand", 20, Rank.COMMAND)
     on_time_ms: Bytes
     delivered_force_body_n: Float64x2
     delivered_torque_nm: F64
@@ -63,6 +40,7 @@ class ValveSelection(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveSelection"
+    TOPIC: ClassVar = Topic("valve_selection", 50, Rank.COMMAND)
     counter: U8
     pulse_id: U8
     on_time_ms: Bytes
@@ -85,6 +63,7 @@ class ValveCommand(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveCommand"
+    TOPIC: ClassVar = Topic("valve_command", 50, Rank.COMMAND)
     counter: U8
     pulse_id: U8
     on_time_ms: Bytes
@@ -99,6 +78,7 @@ class CanIn(Message):
     """A CAN frame that arrived from the valve bus."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CanIn"
+    TOPIC: ClassVar = Topic("can_in", 100, Rank.VALVES, scope=Scope.RIG)
     arbitration_id: U32
     data: Bytes
 
@@ -108,6 +88,7 @@ class CanOut(Message):
     """A CAN frame for the valve bus."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CanOut"
+    TOPIC: ClassVar = Topic("can_out", 50, Rank.COMMAND)
     arbitration_id: U32
     data: Bytes
 
@@ -127,6 +108,7 @@ class ValveStatus(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveStatus"
+    TOPIC: ClassVar = Topic("valve_status", 50, Rank.VALVES)
     open_mask: U8
     counter: U8
     armed: Bool
@@ -134,3 +116,15 @@ class ValveStatus(Message):
     floating: Bool
     pressure_pa: F64
     faults: U8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VehicleMode(Message):
+    """Armed state and the reason for it; latched."""
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleMode"
+    TOPIC: ClassVar = Topic("vehicle_mode", rank=Rank.VALVES, latched=True)
+    armed: Bool
+    stopped: Bool
+    source: Text
+    reason: Text

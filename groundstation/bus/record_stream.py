@@ -1,0 +1,179 @@
+"""The record stream: everything that a process published, many messages in one put.
+
+Recorder, view, console and bridges take this stream and cost the flight nothing: two thousand small puts a
+second through a hub cost far more than fifty large ones. A batch carries its own names, so that entries
+point at them by index and no table of topics is needed to read it.
+
+Layout, little endian: ``magic u32 | names u32 | entries u32 | causes u32 | lengths of names u16 ...`` then
+the names, the entries (``ENTRY``), the causes (``CAUSE``) and the payloads, one after the other.
+"""
+
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.bus.envelope import Cause, Envelope
+
+MAGIC = 0x31535247  # "GRS1"
+_HEAD = struct.Struct("<IIII")
+ENTRY = np.dtype(
+    [
+        ("publish_ns", "<i8"),
+        ("sequence", "<u4"),
+        ("wall_ns", "<u4"),
+        ("cpu_ns", "<u4"),
+        ("size", "<u4"),  # of the payload, bytes
+        ("noun", "<u2"),  # index in names
+        ("owner", "<u2"),
+        ("causes", "<u2"),
+        ("_pad", "<u2"),
+    ]
+)
+CAUSE = np.dtype([("noun", "<u2"), ("owner", "<u2"), ("sequence", "<u4")])
+_LONGEST_NS = 0xFFFFFFFF
+
+
+class BatchError(ValueError):
+    """Bytes that are no batch."""
+
+
+class RecordWriter:
+    """Collects what one process publishes between two puts."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, int] = {}
+        self._entries: list[tuple[int, int, int, int, int, int, int, int, int]] = []
+        self._causes: list[tuple[int, int, int]] = []
+        self._payloads: list[bytes] = []
+        self.size = 0
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def add(self, envelope: Envelope, encoded: bytes) -> None:
+        """Add one message."""
+        topic, owner, sequence, publish_ns, wall_ns, cpu_ns, causes = envelope
+        names = self._names
+        for cause_noun, cause_owner, cause_sequence in causes:
+            self._causes.append(
+                (
+                    names.setdefault(cause_noun, len(names)),
+                    names.setdefault(cause_owner, len(names)),
+                    cause_sequence,
+                )
+            )
+        self._entries.append(
+            (
+                publish_ns,
+                sequence,
+                wall_ns if wall_ns < _LONGEST_NS else _LONGEST_NS,
+                cpu_ns if cpu_ns < _LONGEST_NS else _LONGEST_NS,
+                len(encoded),
+                names.setdefault(topic.noun, len(names)),
+                names.setdefault(owner, len(names)),
+                len(causes),
+                0,
+            )
+        )
+        self._payloads.append(encoded)
+        self.size += len(encoded)
+
+    def take(self) -> bytes:
+        """The batch so far; the next one begins."""
+        names = [name.encode() for name in self._names]
+        head = _HEAD.pack(MAGIC, len(names), len(self._entries), len(self._causes))
+        lengths = struct.pack(f"<{len(names)}H", *map(len, names))
+        entries = np.array(self._entries, dtype=ENTRY).tobytes()
+        causes = np.array(self._causes, dtype=CAUSE).tobytes()
+        packed = b"".join((head, lengths, *names, entries, causes, *self._payloads))
+        self._names.clear()
+        self._entries.clear()
+        self._causes.clear()
+        self._payloads.clear()
+        self.size = 0
+        return packed
+
+
+class Recorded(NamedTuple):
+    """One message of a batch, its payload not decoded yet; a named tuple, since thousands come a second.
+
+    Attributes:
+        noun: Of its topic.
+        owner: Vehicle or process, empty for the rig.
+        sequence: Of the publication.
+        publish_ns: Moment of the publication.
+        wall_ns: Wall time that the node took.
+        cpu_ns: CPU time that it took.
+        causes: What it was made from, the trigger first.
+        data: CDR bytes of the payload.
+    """
+
+    noun: str
+    owner: str
+    sequence: int
+    publish_ns: int
+    wall_ns: int
+    cpu_ns: int
+    causes: tuple[Cause, ...]
+    data: bytes
+
+
+def read_batch(data: bytes) -> Iterator[Recorded]:
+    """Messages of a batch, in the order of their publication.
+
+    Raises:
+        BatchError: The bytes are no batch, or are cut off; nothing is yielded then.
+    """
+    try:
+        magic, name_count, entry_count, cause_count = _HEAD.unpack_from(data)
+        if magic != MAGIC:
+            raise BatchError(f"no batch of the record stream: it begins with {data[:4].hex()}")
+        lengths = struct.unpack_from(f"<{name_count}H", data, _HEAD.size)
+        position = _HEAD.size + 2 * name_count
+        names = []
+        for length in lengths:
+            names.append(data[position : position + length].decode())
+            position += length
+        entries = np.frombuffer(data, ENTRY, entry_count, position)
+        position += entries.nbytes
+        causes = np.frombuffer(data, CAUSE, cause_count, position).tolist()
+        position += cause_count * CAUSE.itemsize
+        rows = entries.tolist()
+        largest = max(name_count, 1)
+        if (
+            position + int(entries["size"].sum()) != len(data)
+            or int(entries["causes"].sum()) != cause_count
+            or any(entries[field].max(initial=0) >= largest for field in ("noun", "owner"))
+            or any(noun >= largest or owner >= largest for noun, owner, _ in causes)
+        ):
+            raise BatchError("a batch of the record stream is cut off")
+    except (struct.error, ValueError) as error:
+        if isinstance(error, BatchError):
+            raise
+        raise BatchError(f"a batch of the record stream is cut off ({error})") from error
+    return _messages(data, position, names, rows, [Cause(names[n], names[o], s) for n, o, s in causes])
+
+
+def _messages(
+    data: bytes,
+    position: int,
+    names: list[str],
+    rows: list[tuple[int, ...]],
+    causes: list[Cause],
+) -> Iterator[Recorded]:
+    first = 0
+    for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, count, _ in rows:
+        last, stop = first + count, position + size
+        yield Recorded(
+            names[noun],
+            names[owner],
+            sequence,
+            publish_ns,
+            wall_ns,
+            cpu_ns,
+            tuple(causes[first:last]),
+            data[position:stop],
+        )
+        first, position = last, stop

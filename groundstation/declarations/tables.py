@@ -1,0 +1,76 @@
+"""The tables of the whole system: the concatenation of what the parts declare, each name once."""
+
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+from groundstation.declarations.fix import FixSource
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import NodeRow
+from groundstation.declarations.part import Part
+from groundstation.declarations.port import PortRow
+from groundstation.declarations.request import Action
+
+T = TypeVar("T")
+
+
+class PartError(ValueError):
+    """Two parts declare the same name, or a part names what no part declares."""
+
+
+class Tables:
+    """What all parts together declare.
+
+    Args:
+        parts: In the order in which equal things are done: nodes of earlier parts receive first.
+        topics: Payload classes of the runners themselves (journal).
+
+    Attributes:
+        parts: By name.
+        payloads: Payload classes by the noun of their topic.
+        nodes: Rows by name, in the order of the parts.
+        ports: Rows, in the order of the parts.
+        actions: Rows by name.
+        fix_sources: Rows by name, the first that a vehicle has being its default.
+
+    Raises:
+        PartError: A name stands twice, or a row names an unknown node.
+    """
+
+    def __init__(self, parts: Iterable[Part], topics: Iterable[type[Message]] = ()) -> None:
+        listed = tuple(parts)
+        self.parts: Mapping[str, Part] = _by_name("part", ((part.name, part) for part in listed))
+        kinds = [*topics, *(kind for part in listed for kind in part.topics)]
+        self.payloads: Mapping[str, type[Message]] = _by_name(
+            "topic", ((kind.TOPIC.noun, kind) for kind in kinds)
+        )
+        self.nodes: Mapping[str, NodeRow] = _by_name(
+            "node", ((row.name, row) for part in listed for row in part.nodes)
+        )
+        self.ports: tuple[PortRow, ...] = tuple(row for part in listed for row in part.ports)
+        self.actions: Mapping[str, Action] = _by_name(
+            "action", ((row.name, row) for part in listed for row in part.actions)
+        )
+        self.fix_sources: Mapping[str, FixSource] = _by_name(
+            "fix source", ((row.name, row) for part in listed for row in part.fix_sources)
+        )
+        for port in self.ports:
+            if port.node not in self.nodes:
+                raise PartError(f"a port is read by a node {port.node!r}, which no part declares")
+        for action in self.actions.values():
+            if action.answered_by not in self.nodes:
+                raise PartError(
+                    f"action {action.name!r} is answered by {action.answered_by!r}, which no part declares"
+                )
+
+    def owner(self, payload: type[Message]) -> str:
+        """Name of the part that declares a payload class; empty for those of the runners."""
+        return next((part.name for part in self.parts.values() if payload in part.topics), "")
+
+
+def _by_name(what: str, rows: Iterable[tuple[str, T]]) -> dict[str, T]:
+    found: dict[str, T] = {}
+    for name, row in rows:
+        if name in found:
+            raise PartError(f"two parts declare a {what} named {name!r}")
+        found[name] = row
+    return found

@@ -1,0 +1,1 @@
+"""What the controller wants, and how far it is from its goal."""

@@ -1,0 +1,63 @@
+"""Open devices that several parts have in common: a line of bytes, a camera."""
+
+from collections.abc import Iterable
+
+from drivers.laboratory import CanFrame
+from groundstation.declarations.port import READ_TIMEOUT_S, Edge
+
+
+class ByteEdge(Edge):
+    """A serial port or socket.
+
+    Args:
+        url: Device path or pyserial URL.
+        baud: Bit rate; sockets ignore it.
+
+    Raises:
+        DeviceError: It cannot be opened.
+    """
+
+    def __init__(self, url: str, baud: int) -> None:
+        from drivers.imu_block.port import SerialPort
+
+        self._port = SerialPort(url, baud)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        stamp_ns, data = self._port.read_chunk(READ_TIMEOUT_S)
+        return ((stamp_ns, data),) if data else ()
+
+    def write(self, data: bytes | CanFrame) -> None:
+        assert isinstance(data, bytes)
+        self._port.write(data)
+
+    def wake(self) -> None:
+        self._port.wake()
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class CameraEdge(Edge):
+    """A camera, newest frame first.
+
+    Args:
+        source: Device index, path, URL or folder.
+        timeout_s: Silence after which the link counts as lost.
+        is_colour: Frames are blue-green-red.
+
+    Raises:
+        DeviceError: It cannot be opened.
+    """
+
+    def __init__(self, source: str, timeout_s: float, *, is_colour: bool = False) -> None:
+        from drivers.star_camera.port import StarCamera  # OpenCV loads only where it is used
+
+        address = int(source) if source.isdigit() else source  # a device index
+        self._camera = StarCamera.open(address, silence_s=timeout_s, is_colour=is_colour)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        frame = self._camera.read(READ_TIMEOUT_S)
+        return () if frame is None else ((frame.stamp_arrival_ns, frame),)
+
+    def close(self) -> None:
+        self._camera.close()

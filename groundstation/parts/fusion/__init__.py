@@ -1,0 +1,1 @@
+"""What fusion believes, and what became of each fix."""

@@ -1,0 +1,1 @@
+"""What the IMU block says, from bytes to calibrated samples."""

@@ -1,0 +1,1 @@
+"""How a rig is run: start sequence, calibrations in use, health, latency."""

@@ -1,0 +1,1 @@
+"""What the camera over the table sees, and how its fixes compare with those of the star tracker."""

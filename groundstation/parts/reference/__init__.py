@@ -1,0 +1,1 @@
+"""What the reference system reports: truth of the emulator, or motion capture."""

@@ -1,0 +1,1 @@
+"""What the star camera sees, from the frame to the fix."""

@@ -1,0 +1,65 @@
+"""What a rig says of star cameras and of streams of fixes."""
+
+from typing import Self
+
+from pydantic import model_validator
+
+from groundstation.declarations.rig_file import RigFile
+from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.star_tracking.delay_file import MeasuredDelay
+
+
+class StarCameraSection(Section):
+    """The star camera: calibration files, delay from exposure to arrival, floor of its errors.
+
+    ``delay_file`` is what `calibrate delay` wrote; it stands for ``delay_s`` and ``delay_sigma_s``.
+    """
+
+    camera: RigFile
+    ceiling: RigFile
+    delay_s: NonNegative = 0.0
+    delay_sigma_s: NonNegative = 0.002
+    delay_file: RigFile | None = None
+    timeout_s: Positive = 2.0
+    exposure_s: NonNegative = 0.0
+    readout_s: NonNegative = 0.0
+    sigma_xy_m: Positive = 0.001
+    sigma_heading_rad: Positive = 0.0009
+
+    @model_validator(mode="after")
+    def _one_delay(self) -> Self:
+        if self.delay_file is not None and self.model_fields_set & {"delay_s", "delay_sigma_s"}:
+            raise ValueError("give either 'delay_file' or 'delay_s' and 'delay_sigma_s'")
+        return self
+
+    @property
+    def delay(self) -> tuple[float, float]:
+        """From the middle of the exposure to the picture's stamp, and its standard deviation, s."""
+        if self.delay_file is None:
+            return self.delay_s, self.delay_sigma_s
+        found = self.delay_file.value(MeasuredDelay.parse)
+        return found.delay_s, found.sigma_s
+
+
+class StarsOfType(Section):
+    """Keys of a type of mock-up."""
+
+    star_camera: StarCameraSection | None = None
+
+
+class StarsOfVehicle(Section):
+    """Keys of a vehicle: where its camera is opened, or a stream of poses that stands in for it."""
+
+    star_camera: str | None = None
+    fixes: str | None = None
+
+    @property
+    def has_stars(self) -> bool:
+        """Whether star fixes are made, or drawn in their place."""
+        return self.star_camera is not None or self.fixes is not None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if self.star_camera is not None and self.fixes is not None:
+            raise ValueError("needs only one of 'star_camera' and 'fixes'")
+        return self
