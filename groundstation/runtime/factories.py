@@ -2,7 +2,6 @@
 
 import math
 
-from calibration.camera.models import CameraCalibration
 from drivers.valve_bus.guard import Guard as Gate
 from drivers.valve_bus.valve_budget import OpenTimeLimits
 from groundstation.control.allocation import Allocator
@@ -38,6 +37,7 @@ from groundstation.runtime.estimation import (
 )
 from groundstation.runtime.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.runtime.rig_mock_up import MockUpSection
+from groundstation.star_tracking.camera_model import CameraCalibration
 
 
 def _model(mock_up: MockUpSection) -> VehicleModel:
