@@ -13,13 +13,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
 from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
 from firmware_emulator.sky.sensor import SensorSettings
 from firmware_emulator.sky.sky_camera import Shutter, SkyCamera
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.fixes import NoFix
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 CALIBRATION = Path(__file__).parent.parent / "calibration" / "rigs" / "emulated"

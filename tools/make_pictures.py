@@ -21,14 +21,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
 from firmware_emulator.sky.scene import read_camera
 from groundstation.bus.envelope import Delivered
 from groundstation.control.vehicle import square_of_eight
 from groundstation.messages.definitions import ReferenceState, StarImage, ValveCommand, VehicleState
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 Array = NDArray[np.float64]

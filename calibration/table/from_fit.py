@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from calibration.table.surface_fit import SurfaceFit
-from calibration.table.table_map import G_M_S2, MapProvenance, TableMap
+from groundstation.fusion.table_map import G_M_S2, MapProvenance, TableMap
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from calibration.imu.result import CalibrationResult, Quantity, provenance_of
 from calibration.imu.zero_offset import NotARest, ZeroOffset, zero_offset
+from calibration.result import CalibrationResult, Quantity, provenance_of
 from groundstation.cli import calibrate_flight, calibrate_guided, calibrate_tilt, table_map
 from groundstation.cli.errors import UsageError
 from groundstation.cli.flight_data import read_flight

@@ -14,8 +14,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from calibration.imu.result import CalibrationResult, Quantity, provenance_of
-from calibration.table.errors import TableMapError
+from calibration.result import CalibrationResult, Quantity, provenance_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.flight_data import read_flight
 from groundstation.cli.fusion import estimate
@@ -26,6 +25,7 @@ from groundstation.fusion.constants import CONSTANTS
 from groundstation.fusion.estimator import FixAccount
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
+from groundstation.fusion.table_map import TableMapError
 
 WIDE_GATE = 60.0
 """While a scale is still unknown, good fixes look worse than they are."""

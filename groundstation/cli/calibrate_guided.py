@@ -15,7 +15,7 @@ import typer
 import zenoh
 
 from calibration.imu.guided import GuidedSequence
-from calibration.imu.result import CalibrationResult, Provenance
+from calibration.result import CalibrationResult, Provenance
 from groundstation.bus.topics import topic_of
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.calibrate_flight import constants, widened

@@ -16,16 +16,15 @@ import numpy as np
 import typer
 
 from calibration.imu.rests import find_rests
-from calibration.imu.result import CalibrationResult, Provenance, Quantity, provenance_of
 from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import Disturbance, NotARest, zero_offset
-from calibration.table.errors import TableMapError
-from calibration.table.table_map import TableMap
+from calibration.result import CalibrationResult, Provenance, Quantity, provenance_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.flight_data import read_flight
 from groundstation.cli.fusion_folder import Array, FusionFolder, read_table, write_atomically
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
+from groundstation.fusion.table_map import TableMap, TableMapError
 
 TILT_COLUMNS = ("along_x_deg", "along_y_deg")
 UNITS = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}

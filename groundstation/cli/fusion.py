@@ -12,8 +12,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from calibration.table.errors import TableMapError
-from calibration.table.table_map import TableMap
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
 from groundstation.fusion.error_state_filter import ErrorStateFilter
@@ -23,6 +21,7 @@ from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 from groundstation.fusion.stamp_ticks import StampTicks
+from groundstation.fusion.table_map import TableMap, TableMapError
 from groundstation.runtime.estimation import slope_grid
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)

@@ -77,8 +77,8 @@ def _not_called() -> None:
 
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
-    from calibration.camera.errors import CalibrationFileError
     from drivers.errors import DeviceError
+    from groundstation.files.errors import CalibrationFileError
     from groundstation.recording.errors import RecordingError
     from groundstation.runtime.errors import GroundStationError, UsageError
 

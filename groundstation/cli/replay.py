@@ -9,8 +9,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from calibration.camera import CalibrationFileError
 from groundstation.cli.errors import UsageError
+from groundstation.files.errors import CalibrationFileError
 from groundstation.nodes.node import Node
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo

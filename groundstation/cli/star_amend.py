@@ -9,18 +9,18 @@ from typing import Annotated
 
 import typer
 
-from calibration.camera import CalibrationFileError, StarCatalogue
-from calibration.camera.star_catalogue import MIN_STARS
-from calibration.imu.result import CalibrationResult, Provenance
+from calibration.result import CalibrationResult, Provenance
+from calibration.sky.amendment import Amendment, AmendmentError, NewPlace, propose
 from groundstation.bus.topics import topic_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import check_targets, write_atomically
+from groundstation.files.errors import CalibrationFileError
 from groundstation.messages import definitions as m
 from groundstation.nodes.star_answers import change_of
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
-from groundstation.star_tracking.amendment import Amendment, AmendmentError, NewPlace, propose
 from groundstation.star_tracking.sky_change import SkyChange
+from groundstation.star_tracking.star_catalogue import MIN_STARS, StarCatalogue
 
 COLUMNS = ("id", "x_m", "y_m", "std_x_m", "std_y_m", "times_seen")
 

@@ -11,15 +11,17 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
-from calibration.camera.board import Board
+from calibration.sky.board import Board
+from calibration.sky.delay import delay_from_headings
+from calibration.sky.lens import lens_from_board, lens_from_stars, mount_from_turn
 from groundstation.cli.delay_source import Turns, turns_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import check_targets, find_frames, read_frame, with_progress
 from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
-from groundstation.sky_calibration.delay import delay_from_headings
-from groundstation.sky_calibration.lens import lens_from_board, lens_from_stars, mount_from_turn
+from groundstation.files.errors import CalibrationFileError
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 Folder = Annotated[Path, typer.Argument(help="With camera.json, ceiling.csv and frames/.")]
 Out = Annotated[Path, typer.Option(help="Result with provenance to write (TOML).")]

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
-from calibration.camera import CameraCalibration
-from calibration.camera.overhead_camera import OverheadCamera
+from calibration.sky.survey.surveyed_sky import Anchor
 from groundstation.cli.errors import UsageError
-from groundstation.star_tracking.survey import Anchor
+from groundstation.overhead.overhead_camera import OverheadCamera
+from groundstation.star_tracking.camera_model import CameraCalibration
 
 _ENDINGS = {".png": b"IEND\xaeB`\x82", ".jpg": b"\xff\xd9", ".jpeg": b"\xff\xd9"}
 _SUFFIXES = frozenset({*_ENDINGS, ".bmp", ".pgm", ".tif", ".tiff"})

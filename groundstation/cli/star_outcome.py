@@ -11,11 +11,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from calibration.imu.result import Provenance
+from calibration.result import Provenance
+from calibration.sky.outcome import CalibrationRefusedError, Outcome, Progress, silent
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import write_atomically
 from groundstation.cli.star_plots import save_figure
-from groundstation.sky_calibration.outcome import CalibrationRefusedError, Outcome, Progress, silent
 
 
 @contextmanager

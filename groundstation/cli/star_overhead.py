@@ -13,17 +13,15 @@ import cv2
 import numpy as np
 import typer
 
-from calibration.camera.board import Board, find_corners
-from calibration.camera.errors import CalibrationFileError
-from calibration.camera.liveries import load_liveries
-from calibration.camera.overhead_camera import OverheadCamera
-from calibration.camera.overhead_pose import (
+from calibration.overhead.pose import (
     POSE,
     BoardView,
     OverheadPose,
     calibrate_overhead_pose,
 )
-from calibration.imu.result import CalibrationResult, Quantity, provenance_of
+from calibration.result import CalibrationResult, Quantity, provenance_of
+from calibration.sky.board import Board, find_corners
+from calibration.sky.figures import draw_board_pose
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
     check_targets,
@@ -33,8 +31,10 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_plots import save_figure
-from groundstation.sky_calibration.figures import draw_board_pose
-from groundstation.star_tracking.overhead import NoOverheadFix, OverheadFix, OverheadTracker
+from groundstation.files.errors import CalibrationFileError
+from groundstation.overhead.liveries import load_liveries
+from groundstation.overhead.overhead_camera import OverheadCamera
+from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
 
 COLUMNS = (
     "frame",

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera import CameraCalibration, StarCatalogue
 from groundstation.cli.star_files import write_picture
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.picture_drawing import draw_notes
 from groundstation.star_tracking.picture_notes import take_notes
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ from typing import Annotated
 import cv2
 import typer
 
-from calibration.camera import CalibrationFileError, CameraCalibration
+from calibration.sky.survey.sweep import survey_sweep
+from calibration.sky.survey.verification import Verification
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
     check_targets,
@@ -17,8 +18,8 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
-from groundstation.sky_calibration.sweep import survey_sweep
-from groundstation.sky_calibration.verification import Verification
+from groundstation.files.errors import CalibrationFileError
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 
 

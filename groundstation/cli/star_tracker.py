@@ -16,7 +16,6 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from calibration.camera import CalibrationFileError, CameraCalibration, StarCatalogue
 from groundstation.cli import star_amend, star_calibration, star_overhead, star_survey
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import (
@@ -28,9 +27,12 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_pictures import PictureFolder
+from groundstation.files.errors import CalibrationFileError
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
 from groundstation.star_tracking.published import PublishedTracker
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 app = typer.Typer(

@@ -11,18 +11,17 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from calibration.imu.result import provenance_of
+from calibration.result import provenance_of
 from calibration.table.equations import FlightPriors, flight_equations
-from calibration.table.errors import TableMapError
 from calibration.table.from_fit import map_of
-from calibration.table.levelling import Levelling, levelling
 from calibration.table.prediction import check_outages
 from calibration.table.separability import separability
 from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import SurfaceFit, fit_surface
-from calibration.table.table_map import G_M_S2, MapProvenance, TableMap
 from groundstation.cli.errors import UsageError
 from groundstation.cli.table_map_flights import Bounds, Source, read_source
+from groundstation.fusion.levelling import Levelling, levelling
+from groundstation.fusion.table_map import G_M_S2, MapProvenance, TableMap, TableMapError
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibration.table.flight_log import FlightLog
-from calibration.table.levelling import Levelling
-from calibration.table.table_map import G_M_S2, TableMap
 from groundstation.cli.errors import UsageError
+from groundstation.fusion.levelling import Levelling
+from groundstation.fusion.table_map import G_M_S2, TableMap
 
 Array = NDArray[np.float64]
 Legs = Mapping[str, tuple[float, float]]

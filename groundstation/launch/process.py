@@ -15,10 +15,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from calibration.camera.errors import CalibrationFileError
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.files.errors import CalibrationFileError
 from groundstation.runtime.child import REFUSAL
 from groundstation.runtime.errors import RigError, UsageError
 from groundstation.runtime.live import LiveProcess

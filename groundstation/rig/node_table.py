@@ -9,17 +9,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from calibration.camera.liveries import load_liveries
-from calibration.camera.models import CameraCalibration
-from calibration.camera.overhead_camera import OverheadCamera
-from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.bus.journal import JournalWriter
 from groundstation.nodes.node import Node
+from groundstation.overhead.liveries import load_liveries
+from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.runtime import factories
 from groundstation.runtime.errors import RigError
 from groundstation.runtime.estimation import noise_of
 from groundstation.runtime.rig import Rig
 from groundstation.runtime.slot import NodeSlot, Sequences, Timing
+from groundstation.star_tracking.camera_model import CameraCalibration
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 
 class Weight(Enum):

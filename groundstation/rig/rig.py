@@ -13,9 +13,9 @@ import can
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from calibration.camera.errors import CalibrationFileError
-from calibration.table.levelling import levelling
 from drivers.valve_bus.messages import MAX_VEHICLES
+from groundstation.files.errors import CalibrationFileError
+from groundstation.fusion.levelling import levelling
 from groundstation.runtime.errors import RigError
 from groundstation.runtime.rig_mock_up import MockUpSection, NonNegative, Positive, Section
 

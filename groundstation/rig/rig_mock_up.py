@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from calibration.camera.delay_file import read_delay
 from groundstation.control.registry import CONTROLLERS
 from groundstation.fusion.registry import ESTIMATORS
+from groundstation.star_tracking.stamp_delay import read_delay
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]

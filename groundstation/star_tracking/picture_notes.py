@@ -11,11 +11,11 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import NoFix, PoseGuess, PosePrior, StarFix
-from groundstation.star_tracking.sky_adjustment import project
+from groundstation.star_tracking.projection import project
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 NO_SPOT = 255
 """In ``spot_of_star``: the star was not seen."""

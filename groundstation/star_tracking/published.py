@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import Mode, NoFix, Refusal, StarFix
 from groundstation.star_tracking.rays import ceiling_points
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
+from groundstation.star_tracking.camera_model import CameraCalibration
 
 _STEP_PX = 2
 _NEWTON_STEPS = 8

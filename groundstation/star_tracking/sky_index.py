@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from calibration.camera.star_catalogue import StarCatalogue
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 _RASTER_CELL_M = 0.02
 _RASTER_REACH_M = 0.12

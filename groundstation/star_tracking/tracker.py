@@ -5,9 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.core.library import Core, default_core
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.compiled_search import CompiledSearch
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
@@ -15,6 +14,7 @@ from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.search import Found, PureSearch, Search
 from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 __all__ = ["StarTracker", "TrackerSettings"]
 

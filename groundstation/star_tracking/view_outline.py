@@ -8,7 +8,7 @@ projection this does not fold far places back into the picture, as a polynomial 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.rays import ceiling_points
 
 _STEP_PX = 2.0  # chords between border points stay within 0.01 px of the border

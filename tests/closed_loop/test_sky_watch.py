@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from calibration.camera import StarCatalogue
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
 from groundstation.messages import definitions as m
 from groundstation.runtime.lockstep_run import run_lockstep
 from groundstation.runtime.rig import parse_rig
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
 CEILING = RIG.parents[2] / "calibration" / "rigs" / "emulated" / "ceiling.csv"

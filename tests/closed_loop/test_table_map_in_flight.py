@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from calibration.table.table_map import MapProvenance, TableMap
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import topic_of
 from groundstation.cli.calibrate import app
+from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.messages import definitions as m
 from groundstation.recording.writer import Recorder
 from groundstation.runtime.provenance import recording_info

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.imu.result import CalibrationResult, Provenance, Quantity
-from calibration.table.table_map import MapProvenance, TableMap
+from calibration.result import CalibrationResult, Provenance, Quantity
 from groundstation.bus.topics import topic_of
 from groundstation.cli.table_map_flights import read_source
+from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.messages.definitions import FusionCalibration
 from groundstation.recording.reader import Recording
 from groundstation.runtime.lockstep_run import run_lockstep

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.imu.constants import ConstantsError, read_constants
-from calibration.table.errors import TableMapError
-from calibration.table.table_map import TableMap
 from groundstation.fusion.constants import noise_with_constants
+from groundstation.fusion.constants_file import ConstantsError, read_constants
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
 from groundstation.fusion.slope_grid import SlopeGrid, noise_with
+from groundstation.fusion.table_map import TableMap, TableMapError
 from groundstation.runtime.errors import RigError
 from groundstation.runtime.rig import Rig
 

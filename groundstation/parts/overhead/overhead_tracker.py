@@ -8,13 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.camera.liveries import load_liveries
-from calibration.camera.overhead_camera import OverheadCamera
 from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import CalibrationInUse, OverheadFix, OverheadImage
 from groundstation.nodes.node import Node
-from groundstation.star_tracking import overhead
+from groundstation.overhead.liveries import load_liveries
+from groundstation.overhead.overhead_camera import OverheadCamera
+from groundstation.overhead import tracker as overhead
 
 
 class OverheadTracker(Node):

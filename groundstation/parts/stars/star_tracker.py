@@ -4,8 +4,6 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import (
     Ack,
@@ -22,12 +20,14 @@ from groundstation.nodes.node import Node
 from groundstation.nodes.picture_choice import PictureChoice
 from groundstation.nodes.state_memory import StateMemory
 from groundstation.star_tracking import tracker
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior
 from groundstation.star_tracking.fixes import StarFix as Fix
 from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.prior_governor import PriorGovernor
 from groundstation.star_tracking.sky_watch import SkyWatch
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 _STILL_M = 1e-3
 """While its rows are read the picture may move so far; beyond, its lights are no witnesses of places."""

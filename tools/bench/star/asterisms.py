@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.star.score import Answer
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.rays import CeilingRays
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 CONTROL_POINTS = 200
 """Of the catalogue; its own 50 would leave most of the ceiling out."""

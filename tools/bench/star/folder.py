@@ -9,8 +9,9 @@ from bench.rows import Bench, Row
 from bench.star.laboratory import Frame
 from bench.star.report import rows_of
 from bench.star.score import run
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 KINDS = {"edge-of-table": "edge", "not-the-ceiling": "dark"}

@@ -11,9 +11,10 @@ from bench.rows import Bench, Row
 from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, TAGS, Frame, Laboratory
 from bench.star.report import rows_of
 from bench.star.score import run
-from calibration.camera import CameraCalibration, StarCatalogue
 from groundstation.core.library import PURE
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 SEED = 1

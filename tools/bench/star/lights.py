@@ -5,8 +5,9 @@ import numpy as np
 from bench.limits import at_most
 from bench.rows import Bench, Row
 from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, spots_at
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 COUNTS = (3, 4, 5, 6, 8, 12, 20, 40)

@@ -11,9 +11,10 @@ from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, TAGS, Frame, Labora
 from bench.star.score import Score, Solver, run_beside
 from bench.star.squares import KINDS, SquareCeiling
 from bench.star.tetra import Tetra
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.published import PublishedTracker
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 SEED = 3

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.star.score import Answer
-from calibration.camera.survey.overlap import rigid_fit
+from groundstation.frames import rigid_fit
 
 ROUNDS = 3
 SIGMAS = 3.0

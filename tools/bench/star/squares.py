@@ -11,8 +11,9 @@ from bench.star.laboratory import Frame
 from bench.star.rigid import rigid_pose
 from bench.star.score import Answer, Score
 from bench.unit import blur_s
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.rays import ceiling_points
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 KINDS = {"ArUco 4x4": cv2.aruco.DICT_4X4_50, "AprilTag 36h11": cv2.aruco.DICT_APRILTAG_36h11}
 """OpenCV's dictionaries; its detector reads both."""

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from bench.star.rigid import rigid_pose
 from bench.star.score import Answer
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.rays import CeilingRays
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 DEG_M = 1.0
 RIGHT_ASCENSION_DEG = 180.0

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from calibration.table.levelling import levelling
-from calibration.table.table_map import G_M_S2
+from groundstation.fusion.levelling import levelling
+from groundstation.fusion.table_map import G_M_S2
 
 LEGS = {"A": (-1.8, -1.3), "B": (1.8, -1.3), "C": (1.8, 1.3), "D": (-1.8, 1.3)}
 SURE = np.eye(2) * (1e-5) ** 2

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from calibration.table.table_map import TableMap
 from groundstation.cli.table_map import app
+from groundstation.fusion.table_map import TableMap
 from groundstation.runtime.errors import UsageError
 
 LEGS = ("--leg", "A:-1.5,-1", "--leg", "B:1.5,-1", "--leg", "C:0,1")

@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibration.table.equations import FlightPriors, flight_equations
-from calibration.table.errors import TableMapError
 from calibration.table.from_fit import map_of
 from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import fit_surface
-from calibration.table.table_map import G_M_S2, MapProvenance, TableMap
+from groundstation.fusion.table_map import G_M_S2, MapProvenance, TableMap, TableMapError
 
 SAID = MapProvenance(
     datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC),

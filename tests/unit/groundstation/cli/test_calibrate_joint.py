@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from calibration.table.table_map import TableMap
 from groundstation.cli.calibrate import app
+from groundstation.fusion.table_map import TableMap
 from groundstation.runtime.lockstep_run import run_lockstep
 from groundstation.runtime.rig import load_rig
 

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.camera.overhead_camera import OverheadCamera
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
 from groundstation.cli.main import call
+from groundstation.overhead.overhead_camera import OverheadCamera
 
 FILES = Path(__file__).parents[4] / "calibration" / "rigs" / "emulated"
 POSES = {"alpha": (-0.8, 0.1, 0.3), "beta": (0.9, 0.7, 2.0)}

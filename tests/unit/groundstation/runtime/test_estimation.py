@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.imu.result import CalibrationResult, Provenance, Quantity
-from calibration.table.table_map import MapProvenance, TableMap
+from calibration.result import CalibrationResult, Provenance, Quantity
 from groundstation.fusion import error_state as es
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
+from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.runtime.errors import RigError
 from groundstation.runtime.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
 from groundstation.runtime.node_table import check_rig

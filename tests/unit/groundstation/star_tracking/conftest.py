@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.camera import CameraCalibration, StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 CAMERA = CameraCalibration(
     width=640,

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from groundstation.star_tracking.amendment import AmendmentError, propose
+from calibration.sky.amendment import AmendmentError, propose
 from groundstation.star_tracking.sky_change import Change, SkyChange
 
 NAMES = ("0", "1", "2", "3", "n5")

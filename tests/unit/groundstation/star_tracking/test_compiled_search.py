@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibration.camera import StarCatalogue
 from groundstation.core.library import PURE
 from groundstation.star_tracking.compiled_search import STRUCTURES
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, StarFix
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 

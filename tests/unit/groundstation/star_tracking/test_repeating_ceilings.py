@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from calibration.camera import StarCatalogue
 from groundstation.core.library import PURE, default_core
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.self_calibration import (
+from calibration.sky.self_calibration import (
     SkyCalibrationError,
     calibrate_intrinsics,
     calibrate_mount,
 )
+from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.tracker import StarTracker
 
 

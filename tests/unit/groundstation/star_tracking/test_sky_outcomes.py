@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from calibration.camera.board import Board
-from calibration.camera.delay_file import read_delay
-from calibration.imu.result import Provenance
+from calibration.result import Provenance
+from calibration.sky import CalibrationRefusedError
+from calibration.sky.board import Board
+from calibration.sky.delay import delay_from_headings
+from calibration.sky.lens import lens_from_board, lens_from_stars, mount_from_turn
+from calibration.sky.residual_structure import find_structure
+from calibration.sky.survey.surveyed_sky import Anchor
+from calibration.sky.survey.sweep import survey_sweep
+from calibration.sky.survey.verification import verify
 from groundstation.cli.star_tracker import app
-from groundstation.sky_calibration import CalibrationRefusedError
-from groundstation.sky_calibration.delay import delay_from_headings
-from groundstation.sky_calibration.lens import lens_from_board, lens_from_stars, mount_from_turn
-from groundstation.sky_calibration.sweep import survey_sweep
-from groundstation.sky_calibration.verification import verify
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.residual_structure import find_structure
-from groundstation.star_tracking.survey import Anchor
+from groundstation.star_tracking.stamp_delay import read_delay
 
 FROM = Provenance("a test", "0" * 64, datetime(2030, 1, 1, tzinfo=UTC))
 SIGMA_PX = 0.03

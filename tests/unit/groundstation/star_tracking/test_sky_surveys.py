@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.sky_adjustment import (
+from calibration.sky.sky_adjustment import (
     HEIGHT,
     OFFSET,
     TILT,
@@ -16,7 +15,8 @@ from groundstation.star_tracking.sky_adjustment import (
     adjust,
     project,
 )
-from groundstation.star_tracking.survey import LENS, Anchor, SurveyError, survey
+from calibration.sky.survey.surveyed_sky import LENS, Anchor, SurveyError, survey
+from groundstation.star_tracking.detection import Spots
 
 
 def spots_at(uv, sigma_px):

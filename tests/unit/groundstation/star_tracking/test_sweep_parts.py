@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from calibration.sky.survey.surveyed_sky import LENS, Anchor, SurveyError, survey
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.survey import LENS, Anchor, SurveyError, survey
 
 
 def spots_at(uv, sigma_px=0.03):

@@ -1,0 +1,87 @@
+"""The constants of a mock-up that calibration files hold: read back from the TOML that the commands wrote."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from groundstation.files.errors import CalibrationFileError
+
+ALIASES: Mapping[str, str] = {
+    "scale": "gyro_scale",
+    "omega_slope": "gyro_temperature_slope",
+    "ax_slope": "acc_x_temperature_slope",
+    "ay_slope": "acc_y_temperature_slope",
+}
+"""What single calibrations call what the joint one names in full."""
+UNITS: Mapping[str, str] = {
+    "gyro_scale": "1",
+    "acc_scale_x": "1",
+    "acc_cross_xy": "1",
+    "acc_cross_yx": "1",
+    "acc_scale_y": "1",
+    "lever_x": "m",
+    "lever_y": "m",
+    "gyro_temperature_slope": "rad/s/C",
+    "acc_x_temperature_slope": "m/s^2/C",
+    "acc_y_temperature_slope": "m/s^2/C",
+    "camera_delay": "s",
+}
+"""What lasts from one run to the next, with the unit that a file must give it in."""
+
+
+class ConstantsError(CalibrationFileError):
+    """A calibration file cannot be used; the message is one sentence that names file and key."""
+
+
+def read_constants(paths: Sequence[Path]) -> dict[str, tuple[float, float]]:
+    """Read value and sigma of every constant that lasts; of one that several files hold, the surest counts.
+
+    Raises:
+        ConstantsError: a file is missing, no TOML or without such a constant; or one of them is wrong.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for path in paths:
+        for name, (value, std) in _read(path).items():
+            if name not in found or std < found[name][1]:
+                found[name] = (value, std)
+    return found
+
+
+def _read(path: Path) -> dict[str, tuple[float, float]]:
+    try:
+        text = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConstantsError(f"{path} cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConstantsError(f"{path} is not valid TOML: {error}") from error
+    found = {}
+    for key, table in text.items():
+        name = ALIASES.get(key, key)
+        if name not in UNITS or not isinstance(table, dict):
+            continue
+        value, std = _number(path, key, table, "value"), _number(path, key, table, "std")
+        if math.isnan(value) or math.isnan(std):
+            continue  # the calibration itself said that it could not tell
+        if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
+            raise ConstantsError(f"{path}: {key} must be finite with a std above zero")
+        if table.get("unit") != UNITS[name]:
+            raise ConstantsError(
+                f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r}"
+            )
+        found[name] = (value, std)
+    if not found:
+        raise ConstantsError(
+            f"{path} holds no constant that lasts: give it the result of `calibrate joint`, `imu`, `tilt`, "
+            "`gyro-scale` or `temperature`"
+        )
+    return found
+
+
+def _number(path: Path, key: str, table: dict[str, object], part: str) -> float:
+    value = table.get(part)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConstantsError(f"{path}: {key}.{part} must be a number, found {value!r}")
+    return float(value)

@@ -1,0 +1,235 @@
+"""The table map as calibration data: acceleration on a grid, its sigma, where it comes from."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import os
+import tomllib
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.files.errors import CalibrationFileError
+from groundstation.files.toml_text import toml_lines, toml_table
+
+Array = NDArray[np.float64]
+
+G_M_S2 = 9.80665
+"""Standard gravity (3rd CGPM, 1901)."""
+_ARRAYS = ("ax_m_s2", "ay_m_s2", "std_x_m_s2", "std_y_m_s2", "height_m")
+
+
+class TableMapError(CalibrationFileError):
+    """A map cannot be read, written or made; the message is one sentence that names the file or key."""
+
+
+@dataclass(frozen=True, slots=True)
+class MapProvenance:
+    """Where a map comes from."""
+
+    made_utc: datetime
+    recordings: dict[str, str]
+    """SHA-256 by name."""
+    residual_ratio: float
+    """Chi-square of the flights' innovations over their number."""
+    flown_s: float
+    notes: dict[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TableMap:
+    """Acceleration of an unpushed vehicle over the table, table frame; arrays (rows over y, columns over x).
+
+    It is what accelerometers do not feel: gravity along the surface. Between grid points it is bilinear;
+    outside it is the mean slope, with `far_std_m_s2`.
+    """
+
+    x_min_m: float
+    y_min_m: float
+    step_m: float
+    ax_m_s2: Array
+    ay_m_s2: Array
+    std_x_m_s2: Array
+    std_y_m_s2: Array
+    height_m: Array
+    """Of the surface about the mean plane, mean zero."""
+    mean_m_s2: tuple[float, float]
+    """Average over the table."""
+    mean_cov_m2_s4: Array
+    """(2, 2)."""
+    far_std_m_s2: float
+    """Sigma, per axis, where nothing is known but the mean slope."""
+    provenance: MapProvenance
+
+    def __post_init__(self) -> None:
+        shape = self.ax_m_s2.shape
+        if len(shape) != 2 or min(shape) < 2:
+            raise TableMapError(f"a map needs at least 2 x 2 grid points, found {shape}")
+        for name in _ARRAYS:
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise TableMapError(f"{name} is {value.shape}, ax_m_s2 is {shape}")
+            if not np.isfinite(value).all():
+                raise TableMapError(f"{name} holds a number that is not finite")
+        if not (math.isfinite(self.step_m) and self.step_m > 0.0):
+            raise TableMapError(f"step_m must be above zero, found {self.step_m}")
+
+    @property
+    def x_m(self) -> Array:
+        """Grid lines along x."""
+        return np.asarray(self.x_min_m + self.step_m * np.arange(self.ax_m_s2.shape[1]), dtype=np.float64)
+
+    @property
+    def y_m(self) -> Array:
+        """Grid lines along y."""
+        return np.asarray(self.y_min_m + self.step_m * np.arange(self.ax_m_s2.shape[0]), dtype=np.float64)
+
+    @property
+    def mean_gradient_rad(self) -> tuple[float, float]:
+        """Mean uphill gradient (dh/dx, dh/dy)."""
+        return -self.mean_m_s2[0] / G_M_S2, -self.mean_m_s2[1] / G_M_S2
+
+    def acceleration_m_s2(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Return the acceleration (ax, ay) at one place; plain floats, for controllers and filters."""
+        cell = self._cell(x_m, y_m)
+        if cell is None:
+            return self.mean_m_s2
+        return self._between(self.ax_m_s2, *cell), self._between(self.ay_m_s2, *cell)
+
+    def std_m_s2(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Return the standard deviation of the acceleration at one place, per axis."""
+        cell = self._cell(x_m, y_m)
+        if cell is None:
+            return self.far_std_m_s2, self.far_std_m_s2
+        return self._between(self.std_x_m_s2, *cell), self._between(self.std_y_m_s2, *cell)
+
+    def accelerations_m_s2(self, position_m: Array) -> Array:
+        """Return the acceleration (n, 2) at positions (n, 2)."""
+        found = [self.acceleration_m_s2(x, y) for x, y in position_m.tolist()]
+        return np.array(found).reshape(-1, 2)
+
+    def _cell(self, x_m: float, y_m: float) -> tuple[int, int, float, float] | None:
+        rows, columns = self.ax_m_s2.shape
+        u, v = (x_m - self.x_min_m) / self.step_m, (y_m - self.y_min_m) / self.step_m
+        if not (0.0 <= u <= columns - 1.0 and 0.0 <= v <= rows - 1.0):
+            return None
+        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
+        return i, j, u - i, v - j
+
+    @staticmethod
+    def _between(grid: Array, i: int, j: int, u: float, v: float) -> float:
+        low = (1.0 - u) * grid.item(j, i) + u * grid.item(j, i + 1)
+        high = (1.0 - u) * grid.item(j + 1, i) + u * grid.item(j + 1, i + 1)
+        return (1.0 - v) * low + v * high
+
+    def save(self, path: Path) -> None:
+        """Write `path` (TOML) and the grid beside it (`.npz`), both or none.
+
+        Raises:
+            TableMapError: the folder does not exist or may not be written.
+        """
+        memory = io.BytesIO()
+        np.savez_compressed(memory, **{name: getattr(self, name) for name in _ARRAYS}, allow_pickle=False)
+        grid, grid_path = memory.getvalue(), path.with_suffix(".npz")
+        text = self._text(grid_path.name, hashlib.sha256(grid).hexdigest())
+        parts = [(path.with_name(f".{p.name}.{os.getpid()}.part"), p) for p in (grid_path, path)]
+        try:
+            for (part, _), data in zip(parts, (grid, text.encode()), strict=True):
+                part.write_bytes(data)
+            for part, final in parts:
+                os.replace(part, final)  # noqa: PTH105 - the call that promises atomicity
+        except OSError as error:
+            raise TableMapError(f"{path} cannot be written: {error.strerror}") from error
+        finally:
+            for part, _ in parts:
+                part.unlink(missing_ok=True)
+
+    def _text(self, grid_name: str, grid_sha256: str) -> str:
+        said = self.provenance
+        std = np.sqrt(self.mean_cov_m2_s4.diagonal())
+        lines = ["# Table map: what pulls an unpushed vehicle along the table, by place", ""]
+        lines += toml_lines({"made_utc": said.made_utc})
+        lines += toml_table(
+            "grid",
+            {
+                "file": grid_name,
+                "sha256": grid_sha256,
+                "x_min_m": self.x_min_m,
+                "y_min_m": self.y_min_m,
+                "step_m": self.step_m,
+                "columns": self.ax_m_s2.shape[1],
+                "rows": self.ax_m_s2.shape[0],
+            },
+        )
+        mean = {"value": list(self.mean_m_s2), "std": std.tolist(), "unit": "m/s^2"}
+        tilt = [self.mean_gradient_rad, (std / G_M_S2).tolist()]
+        lines += toml_table("mean.acceleration", mean)
+        lines += toml_table("mean.covariance", {"value": self.mean_cov_m2_s4.tolist(), "unit": "m^2/s^4"})
+        lines += toml_table("mean.uphill_gradient", {"value": tilt[0], "std": tilt[1], "unit": "rad"})
+        lines += toml_table("unvisited_std", {"value": self.far_std_m_s2, "unit": "m/s^2"})
+        lines += toml_table("residual.chi_square_ratio", {"value": said.residual_ratio, "unit": "1"})
+        lines += toml_table("flown", {"value": said.flown_s, "unit": "s"})
+        if said.notes:
+            lines += toml_table("notes", said.notes)
+        for name, sha256 in said.recordings.items():
+            lines += toml_table("recordings", {"name": name, "sha256": sha256}, is_row=True)
+        return "\n".join(lines) + "\n"
+
+    @classmethod
+    def load(cls, path: Path) -> TableMap:
+        """Read a map.
+
+        Raises:
+            TableMapError: one sentence with file and key.
+        """
+        try:
+            text = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise TableMapError(f"{path} cannot be read: {error.strerror}") from error
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise TableMapError(f"{path} is not valid TOML: {error}") from error
+        try:
+            return cls._from(text, _read_grid(path, text))
+        except KeyError as error:
+            raise TableMapError(f"{path}: key {error.args[0]} is missing") from error
+        except (TypeError, ValueError) as error:
+            raise TableMapError(f"{path}: {error}") from error
+
+    @classmethod
+    def _from(cls, text: dict[str, Any], grids: dict[str, Array]) -> TableMap:
+        grid, mean = text["grid"], text["mean"]
+        return cls(
+            x_min_m=float(grid["x_min_m"]),
+            y_min_m=float(grid["y_min_m"]),
+            step_m=float(grid["step_m"]),
+            **grids,
+            mean_m_s2=(float(mean["acceleration"]["value"][0]), float(mean["acceleration"]["value"][1])),
+            mean_cov_m2_s4=np.array(mean["covariance"]["value"], dtype=np.float64).reshape(2, 2),
+            far_std_m_s2=float(text["unvisited_std"]["value"]),
+            provenance=MapProvenance(
+                text["made_utc"].astimezone(UTC),
+                {row["name"]: row["sha256"] for row in text["recordings"]},
+                float(text["residual"]["chi_square_ratio"]["value"]),
+                float(text["flown"]["value"]),
+                dict(text.get("notes", {})),
+            ),
+        )
+
+
+def _read_grid(path: Path, text: dict[str, Any]) -> dict[str, Array]:
+    """Read the arrays that a map's TOML names, and check that they are the ones it was written with."""
+    grid_path = path.with_name(str(text["grid"]["file"]))
+    try:
+        data = grid_path.read_bytes()
+    except OSError as error:
+        raise TableMapError(f"{grid_path}, named by {path}, cannot be read: {error.strerror}") from error
+    if hashlib.sha256(data).hexdigest() != text["grid"]["sha256"]:
+        raise TableMapError(f"{grid_path} is not the grid that {path} was written with (SHA-256 differs)")
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        return {name: np.asarray(arrays[name], dtype=np.float64) for name in _ARRAYS}

@@ -1,0 +1,141 @@
+"""The camera over the table that looks down: lens, place and attitude, read from its JSON file."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.files.errors import CalibrationFileError
+from groundstation.files.json_file import read_camera_file
+from groundstation.frames import turned_axes
+
+_DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class OverheadCamera:
+    """A calibrated camera that looks down on the table.
+
+    Attributes:
+        width: Columns of the picture.
+        height: Rows of the picture.
+        fx: Focal length, px.
+        fy: Focal length, px.
+        cx: Principal point, px.
+        cy: Principal point, px.
+        distortion: k1, k2, p1, p2, k3 of OpenCV's model.
+        position_table_m: Optical centre (x, y, z); z is the height above the table's surface.
+        yaw_rad: From table +x to the picture's right, counter-clockwise seen from above.
+        tilt_x_rad: Small turn about the level camera's table-ward x axis; see ``table_from_camera``.
+        tilt_y_rad: Likewise about y.
+
+    Raises:
+        ValueError: A number that is not finite, or a size, focal length or height that is not positive.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float]
+    position_table_m: tuple[float, float, float]
+    yaw_rad: float = 0.0
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        numbers = (self.cx, self.cy, *self.distortion, *self.position_table_m)
+        angles = (self.yaw_rad, self.tilt_x_rad, self.tilt_y_rad)
+        if not all(map(math.isfinite, (*numbers, *angles, self.fx, self.fy))):
+            raise ValueError("every number of an overhead camera must be finite")
+        for key in ("width", "height", "fx", "fy"):
+            if not getattr(self, key) > 0:
+                raise ValueError(f"key '{key}' must be positive, not {getattr(self, key)}")
+        if not self.position_table_m[2] > 0.0:
+            raise ValueError("key 'position_table_m' must put the camera above the table (z > 0)")
+        if not self.table_from_camera()[2, 2] < 0.0:
+            raise ValueError("the tilts turn the camera away from the table")
+
+    def table_from_camera(self) -> NDArray[np.float64]:
+        """Rotation (3, 3) whose columns are the camera axes in the table: Rz(yaw) Rx(tilt_x) Ry(tilt_y) D.
+
+        D = diag(1, -1, -1) is the level camera: picture's right along +x, picture's down along -y.
+        """
+        return np.asarray(turned_axes(self.yaw_rad, self.tilt_x_rad, self.tilt_y_rad) @ _DOWN)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "OverheadCamera":
+        """Read the camera's JSON file.
+
+        Raises:
+            CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
+        """
+        path = Path(path)
+        data = read_camera_file(path)
+        try:
+            return cls.from_mapping(data)
+        except ValueError as error:
+            raise CalibrationFileError(f"{path}: {error}.") from error
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any]) -> "OverheadCamera":
+        """Make one from the keys of the JSON file.
+
+        Raises:
+            ValueError: A key is missing, unknown or impossible; the message names it.
+        """
+        unknown = set(data) - _KEYS.keys()
+        if unknown:
+            raise ValueError(f"'{min(unknown)}' is no key of an overhead camera")
+        found = {key: _numbers(data, key, count) for key, count in _KEYS.items()}
+        k1, k2, p1, p2, k3 = found.pop("dist_k1_k2_p1_p2_k3")
+        x, y, z = found.pop("position_table_m")
+        single = {key: values[0] for key, values in found.items()}
+        sides = {key: single.pop(key) for key in ("width", "height")}
+        for key, value in sides.items():
+            if value != int(value):
+                raise ValueError(f"key '{key}' must be a whole number, not {value}")
+        return cls(
+            width=int(sides["width"]),
+            height=int(sides["height"]),
+            distortion=(k1, k2, p1, p2, k3),
+            position_table_m=(x, y, z),
+            **single,
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Give the keys of the JSON file."""
+        single = {key: getattr(self, key) for key, count in _KEYS.items() if count == 1}
+        return {
+            **{key: single[key] for key in ("width", "height", "fx", "fy", "cx", "cy")},
+            "dist_k1_k2_p1_p2_k3": list(self.distortion),
+            "position_table_m": list(self.position_table_m),
+            **{key: single[key] for key in ("yaw_rad", "tilt_x_rad", "tilt_y_rad")},
+        }
+
+
+_KEYS = {
+    **dict.fromkeys(("width", "height", "fx", "fy", "cx", "cy"), 1),
+    "dist_k1_k2_p1_p2_k3": 5,
+    "position_table_m": 3,
+    **dict.fromkeys(("yaw_rad", "tilt_x_rad", "tilt_y_rad"), 1),
+}
+
+
+def _numbers(data: Mapping[str, Any], key: str, count: int) -> list[float]:
+    if key not in data:
+        raise ValueError(f"key '{key}' is missing")
+    value = data[key] if count > 1 else [data[key]]
+    wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
+    if not isinstance(value, list) or len(value) != count:
+        raise ValueError(f"key '{key}' must be {wanted}, found {data[key]!r}")
+    for item in value:
+        if isinstance(item, bool) or not isinstance(item, int | float) or not math.isfinite(item):
+            raise ValueError(f"key '{key}' must be {wanted}, found {data[key]!r}")
+    return [float(item) for item in value]

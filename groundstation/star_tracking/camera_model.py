@@ -1,0 +1,167 @@
+"""How one star camera sees: intrinsics, lens distortion, and how it is bolted to the body.
+
+Frames: ``camera`` is OpenCV's (x right, y down, z forward, origin in the optical centre); ``body`` is
+the vehicle's. The mount is ``body_from_camera = Rz(yaw) Rx(tilt_x) Ry(tilt_y)``, whose columns are
+the camera axes in the body frame: looking up with image right along body x.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.files.errors import CalibrationFileError
+from groundstation.files.json_file import read_camera_file
+from groundstation.frames import turned_axes
+
+_SCALARS = (
+    "fx",
+    "fy",
+    "cx",
+    "cy",
+    "ceiling_height_above_camera_m",
+    "mount_yaw_rad",
+    "mount_tilt_x_rad",
+    "mount_tilt_y_rad",
+)
+_MAX_TILT_RAD = 0.5  # beyond this the ceiling leaves the picture: the file means degrees
+
+
+@dataclass(frozen=True, slots=True)
+class CameraCalibration:
+    """One star camera, as calibrated.
+
+    Attributes:
+        width: Columns of a frame, px.
+        height: Rows of a frame, px.
+        fx: Focal length along the rows, px.
+        fy: Focal length along the columns, px.
+        cx: Principal point, px; pixel (0, 0) is the centre of the top-left pixel.
+        cy: Principal point, px.
+        distortion: k1, k2, p1, p2, k3 of OpenCV's model.
+        ceiling_height_above_camera_m: Plane of the LEDs above the optical centre.
+        mount_offset_body_m: Optical centre in the body frame (x, y, z).
+        mount_yaw_rad: Mount rotation about body z.
+        mount_tilt_x_rad: Mount rotation about the yawed x axis.
+        mount_tilt_y_rad: Mount rotation about the axis y that results.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float]
+    ceiling_height_above_camera_m: float
+    mount_offset_body_m: tuple[float, float, float]
+    mount_yaw_rad: float = 0.0
+    mount_tilt_x_rad: float = 0.0
+    mount_tilt_y_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.width < 16 or self.height < 16:
+            raise ValueError(f"width and height must be at least 16 px, not {self.width} x {self.height}")
+        if not (self.fx > 0.0 and self.fy > 0.0):
+            raise ValueError(f"fx and fy must be positive, not {self.fx} and {self.fy}")
+        if not self.ceiling_height_above_camera_m > 0.0:
+            raise ValueError(
+                f"ceiling_height_above_camera_m must be positive, not {self.ceiling_height_above_camera_m}"
+            )
+        for name in ("mount_tilt_x_rad", "mount_tilt_y_rad"):
+            if abs(getattr(self, name)) > _MAX_TILT_RAD:
+                raise ValueError(f"{name} must lie within +-{_MAX_TILT_RAD} rad, not {getattr(self, name)}")
+
+    @property
+    def matrix_px(self) -> NDArray[np.float64]:
+        """Camera matrix, (3, 3), px."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def body_from_camera(self) -> NDArray[np.float64]:
+        """Rotation matrix (3, 3): columns are the camera axes in the body frame."""
+        return turned_axes(self.mount_yaw_rad, self.mount_tilt_x_rad, self.mount_tilt_y_rad)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "CameraCalibration":
+        """Read ``camera.json``.
+
+        Raises:
+            CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
+        """
+        path = Path(path)
+        data = read_camera_file(path)
+        try:
+            return cls.from_mapping(data)
+        except ValueError as error:
+            raise CalibrationFileError(f"{path}: {error}.") from error
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any]) -> "CameraCalibration":
+        """Make one from the keys of ``camera.json``.
+
+        Raises:
+            ValueError: A key is missing or its value is not of its kind; the message names the key.
+        """
+        numbers = {key: _number(data, key) for key in _SCALARS}
+        distortion = _numbers(data, "dist_k1_k2_p1_p2_k3", 5)
+        offset = _numbers(data, "mount_offset_body_m", 3)
+        return cls(
+            width=_integer(data, "width"),
+            height=_integer(data, "height"),
+            distortion=(distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]),
+            mount_offset_body_m=(offset[0], offset[1], offset[2]),
+            **numbers,
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Give the keys of ``camera.json``."""
+        return {
+            "width": self.width,
+            "height": self.height,
+            "fx": self.fx,
+            "fy": self.fy,
+            "cx": self.cx,
+            "cy": self.cy,
+            "dist_k1_k2_p1_p2_k3": list(self.distortion),
+            "ceiling_height_above_camera_m": self.ceiling_height_above_camera_m,
+            "mount_offset_body_m": list(self.mount_offset_body_m),
+            "mount_yaw_rad": self.mount_yaw_rad,
+            "mount_tilt_x_rad": self.mount_tilt_x_rad,
+            "mount_tilt_y_rad": self.mount_tilt_y_rad,
+        }
+
+    def with_height(self, ceiling_height_above_camera_m: float) -> "CameraCalibration":
+        """Give the same camera under a ceiling of another height."""
+        return replace(self, ceiling_height_above_camera_m=ceiling_height_above_camera_m)
+
+
+def _number(data: Mapping[str, Any], key: str) -> float:
+    if key not in data:
+        raise ValueError(f"key '{key}' is missing")
+    return _finite(data[key], key)
+
+
+def _integer(data: Mapping[str, Any], key: str) -> int:
+    value = _number(data, key)
+    if value != int(value):
+        raise ValueError(f"key '{key}' must be a whole number, not {value}")
+    return int(value)
+
+
+def _numbers(data: Mapping[str, Any], key: str, count: int) -> list[float]:
+    if key not in data:
+        raise ValueError(f"key '{key}' is missing")
+    value = data[key]
+    if not isinstance(value, list) or len(value) != count:
+        raise ValueError(f"key '{key}' must be a list of {count} numbers")
+    return [_finite(item, key) for item in value]
+
+
+def _finite(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"key '{key}' must be a finite number, not {value!r}")
+    return float(value)
