@@ -86,7 +86,7 @@ class NodeRow:
 
     Attributes:
         name: As in rig files, journals and health.
-        process: Default process; ``{vehicle}`` is filled in.
+        process: Default process, or what says it; ``{vehicle}`` is filled in.
         weight: What it may share a process with.
         make: Builds it from the rig for a vehicle.
         condition: Whether a vehicle has it.
@@ -94,7 +94,7 @@ class NodeRow:
     """
 
     name: str
-    process: str
+    process: str | Callable[[Rig, str], str]
     weight: Weight
     make: Callable[[Rig, str], Node]
     condition: Callable[[Rig, str], bool] = always
@@ -105,6 +105,14 @@ class NodeRow:
         if self.is_of_rig:
             return [""] if self.condition(rig, "") else []
         return [name for name in rig.vehicles if self.condition(rig, name)]
+
+    def home(self, rig: Rig, vehicle: str) -> str:
+        """The process of the node: the rig's word, or the row's."""
+        section = rig.nodes.get(self.name)
+        template = section.process if section is not None else None
+        if not template:
+            template = self.process if isinstance(self.process, str) else self.process(rig, vehicle)
+        return template.replace("{vehicle}", vehicle)
 
     def key(self, vehicle: str) -> str:
         """Key of the node in journals: ``vehicle/name``, or ``name`` for a node of the rig."""

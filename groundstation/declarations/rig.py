@@ -12,11 +12,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
 from groundstation.declarations.vehicle_type import ValvesSection, VehicleType
+from groundstation.fusion.levelling import levelling
+from groundstation.fusion.slope_grid import SlopeGrid, slope_grid
+from groundstation.fusion.table_map import TableMap, TableMapError
 
 if TYPE_CHECKING:
     from groundstation.declarations.tables import Tables
@@ -47,6 +52,15 @@ class TableSection(Section):
     waviness_length_m: Positive | None = None
 
     @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.legs:
+            try:
+                levelling((0.0, 0.0), np.eye(2), self.legs)
+            except ValueError as error:
+                raise ValueError(f"legs: {error}") from error
+        return self
+
+    @model_validator(mode="after")
     def _ordered(self) -> Self:
         for axis, low, high in (("x", self.x_min_m, self.x_max_m), ("y", self.y_min_m, self.y_max_m)):
             if high - low <= 2 * MOCK_UP_RADIUS_M:
@@ -54,6 +68,25 @@ class TableSection(Section):
                     f"{axis}_min_m = {low:g} and {axis}_max_m = {high:g} leave no room for a mock-up"
                 )
         return self
+
+    def slope_grid(self) -> SlopeGrid | None:
+        """The table's map as filter and controller read it, None if the rig names none.
+
+        Raises:
+            ValueError: The map's file is wrong.
+        """
+        if self.map is None:
+            return None
+        try:
+            return slope_grid(self.map.value(TableMap.load))
+        except TableMapError as error:
+            raise ValueError(f"table.map: {error}") from error
+
+    def keep_in(self) -> KeepIn:
+        """The part of the table that a mock-up's centre keeps to."""
+        size_m = (self.x_max_m - self.x_min_m, self.y_max_m - self.y_min_m)
+        centre_m = ((self.x_max_m + self.x_min_m) / 2, (self.y_max_m + self.y_min_m) / 2)
+        return rectangle(size_m, margin_m=MOCK_UP_RADIUS_M, centre_table_m=centre_m)
 
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a mock-up at this place is on the table as a whole."""

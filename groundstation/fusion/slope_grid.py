@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.table_map import TableMap
 
 Array = NDArray[np.float64]
 
@@ -77,3 +78,11 @@ def noise_with(noise: NoiseModel, grid: SlopeGrid) -> NoiseModel:
     """
     left = min(1.25 * float(np.percentile(grid.std_m_s2, 25)), noise.waviness_sigma_m_s2)
     return replace(noise, slope_sigma_m_s2=RELEVELLING_SIGMA_M_S2, waviness_sigma_m_s2=left)
+
+
+def slope_grid(found: TableMap) -> SlopeGrid:
+    """Return a map as filters and controllers read it."""
+    std = np.sqrt(0.5 * (found.std_x_m_s2**2 + found.std_y_m_s2**2))
+    return SlopeGrid(
+        found.x_min_m, found.y_min_m, found.step_m, found.ax_m_s2, found.ay_m_s2, std, found.mean_m_s2
+    )

@@ -1,0 +1,95 @@
+"""Part ``control``: the state becomes the wrench that the vehicle's controller wants."""
+
+import math
+
+from pydantic import ValidationError
+
+from groundstation.control.registry import ControllerRow, controllers
+from groundstation.control.state import Goal
+from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
+from groundstation.declarations.part import Part
+from groundstation.declarations.rig import Rig
+from groundstation.parts.control.actions import GO_TO
+from groundstation.parts.control.controller import Controller
+from groundstation.parts.control.gauges import GAUGES, StationFigure
+from groundstation.parts.control.messages import ControlStatus, Wrench
+from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of
+
+
+def _row(rig: Rig, vehicle: str) -> ControllerRow:
+    return controllers()[control_of(rig, vehicle)[0].controller]
+
+
+def _process(rig: Rig, vehicle: str) -> str:
+    """A controller from another package has a process of its own: if it hangs, the state lives on."""
+    return FLIGHT if _row(rig, vehicle).is_built_in else "{vehicle}_controller"
+
+
+def _controller(rig: Rig, vehicle: str) -> Node:
+    section, hold = control_of(rig, vehicle)[0], rig.vehicles[vehicle].hold
+    row, keep_in = _row(rig, vehicle), rig.table.keep_in()
+    config = row.config.model_validate(section.parameters)
+    law = row.make(config, rig.type_of(vehicle).model(), keep_in)
+    goal = Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg))
+    return Controller(
+        vehicle,
+        law,
+        section.controller,
+        goal,
+        keep_in,
+        row.neighbours(config),
+        rig.type_of(vehicle).valves.period_s,
+        rig.table.slope_grid(),
+    )
+
+
+def _check(rig: Rig) -> None:
+    for name, type_ in rig.mock_ups.items():
+        assert isinstance(type_, ControlOfType)
+        _check_name(type_.control.controller, f"mock_ups.{name}.control")
+    for name in rig.vehicles:
+        section, key = control_of(rig, name)
+        _check_name(section.controller, key)
+        row = controllers()[section.controller]
+        try:
+            config = row.config.model_validate(section.parameters)
+        except ValidationError as error:
+            raise ValueError(f"{key}.parameters.{_first(error)}") from error
+        for neighbour in row.neighbours(config):
+            if neighbour == name or neighbour not in rig.vehicles:
+                others = ", ".join(other for other in rig.vehicles if other != name) or "none"
+                raise ValueError(
+                    f"{key}.parameters: {neighbour!r} is no other vehicle of the rig (there are: {others})"
+                )
+        try:
+            row.make(config, rig.type_of(name).model(), rig.table.keep_in())
+        except ValueError as error:
+            raise ValueError(f"{key}.parameters: {error}") from error
+
+
+def _check_name(controller: str, key: str) -> None:
+    if controller not in controllers():
+        known = ", ".join(sorted(controllers()))
+        raise ValueError(f"{key}: controller {controller!r} is none of {known}")
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    where = ".".join(map(str, first["loc"]))
+    if first["type"] == "extra_forbidden":
+        return f"{where}: is no parameter of this controller (a typo?)"
+    return f"{where}: {first['msg'].removeprefix('Value error, ')}, found {first['input']!r}"
+
+
+PART = Part(
+    name="control",
+    summary="the state becomes the wrench that the controller wants",
+    topics=(Wrench, ControlStatus),
+    nodes=(NodeRow("controller", _process, Weight.LIGHT, _controller),),
+    actions=(GO_TO,),
+    mock_up=ControlOfType,
+    vehicle=ControlOfVehicle,
+    check=_check,
+    gauges=GAUGES,
+    figures=(StationFigure,),
+)

@@ -1,0 +1,35 @@
+"""What a rig says of controllers: the type gives the default, a vehicle may have its own."""
+
+from typing import Any
+
+from pydantic import Field
+
+from groundstation.declarations.rig import Rig
+from groundstation.declarations.section import Section
+
+
+class ControlSection(Section):
+    """Which controller flies a vehicle, and its parameters as that controller defines them."""
+
+    controller: str = "station"
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class ControlOfType(Section):
+    """Keys of a type of mock-up."""
+
+    control: ControlSection = ControlSection()
+
+
+class ControlOfVehicle(Section):
+    """Keys of a vehicle; what it says stands in place of its type's section."""
+
+    control: ControlSection | None = None
+
+
+def control_of(rig: Rig, vehicle: str) -> tuple[ControlSection, str]:
+    """The section that holds for a vehicle, and its key in the file."""
+    own = rig.vehicle(vehicle, ControlOfVehicle).control
+    if own is not None:
+        return own, f"vehicles.{vehicle}.control"
+    return rig.of_type(vehicle, ControlOfType).control, f"mock_ups.{rig.vehicles[vehicle].mock_up}.control"

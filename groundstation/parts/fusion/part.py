@@ -1,0 +1,76 @@
+"""Part ``fusion``: IMU samples and late fixes become the vehicle's state."""
+
+from groundstation.control.valve_push import ValvePush
+from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
+from groundstation.declarations.part import Part
+from groundstation.declarations.rig import Rig
+from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.registry import ESTIMATORS
+from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
+from groundstation.parts.fusion.force_stand_in import ForceStandIn
+from groundstation.parts.fusion.fusion import Fusion
+from groundstation.parts.fusion.gauges import FIGURES, GAUGES
+from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
+from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle
+
+
+def _fusion(rig: Rig, vehicle: str) -> Node:
+    method = rig.of_type(vehicle, FusionOfType).fusion.method
+    noise, grid = noise_of(rig, vehicle), rig.table.slope_grid()
+    estimator = ESTIMATORS[method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
+    type_ = rig.type_of(vehicle)
+    push = ValvePush(type_.model(), type_.valves.open_delay_s, type_.valves.close_delay_s)
+    stand_in = ForceStandIn(estimator, push, type_.mass_kg, type_.inertia_kg_m2)
+    payloads = {name: rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle)}
+    return Fusion(
+        vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration_texts(rig, vehicle), stand_in
+    )
+
+
+def _check(rig: Rig) -> None:
+    for name, type_ in rig.mock_ups.items():
+        assert isinstance(type_, FusionOfType)
+        if rig.table.map is not None and type_.fusion.method != "filter":
+            raise ValueError(
+                f"table.map: the estimator {type_.fusion.method!r} of mock_ups.{name} takes no map: "
+                "choose 'filter', or leave the map out"
+            )
+    for name in rig.vehicles:
+        _check_sources(rig, name)
+        noise_of(rig, name)  # reads the table map and the IMU's calibration
+
+
+def _check_sources(rig: Rig, name: str) -> None:
+    named = rig.vehicle(name, FusionOfVehicle).fix_sources
+    known = rig.tables.fix_sources
+    if len(set(named)) < len(named):
+        raise ValueError(f"vehicles.{name}: fix_sources names a source twice: {', '.join(named)}")
+    for source in named:
+        if source not in known:
+            raise ValueError(
+                f"vehicles.{name}.fix_sources: {source!r} is no source of fixes (there are {', '.join(known)})"
+            )
+        if not known[source].condition(rig, name):
+            raise ValueError(f"vehicles.{name}: fix_sources {source!r} needs {known[source].needs}")
+    fused = fused_sources(rig, name)
+    if not fused:
+        needs = ", or ".join(source.needs for source in known.values())
+        raise ValueError(f"vehicles.{name}: nothing says where it is: it needs {needs}")
+    method = rig.of_type(name, FusionOfType).fusion.method
+    if len(fused) > 1 and method != "filter":
+        raise ValueError(
+            f"vehicles.{name}.fix_sources: the estimator {method!r} takes one source: choose 'filter', or name one"
+        )
+
+
+PART = Part(
+    name="fusion",
+    summary="samples and late fixes become the state of the centre of mass",
+    topics=(VehicleState, FixAccount, FusionStatus, FusionCalibration),
+    nodes=(NodeRow("fusion", FLIGHT, Weight.URGENT, _fusion),),
+    mock_up=FusionOfType,
+    vehicle=FusionOfVehicle,
+    check=_check,
+    gauges=GAUGES,
+    figures=FIGURES,
+)

@@ -1,0 +1,33 @@
+"""What a rig says of estimators."""
+
+from typing import Self
+
+from pydantic import model_validator
+
+from groundstation.declarations.section import Positive, Section
+from groundstation.fusion.registry import ESTIMATORS
+
+
+class FusionSection(Section):
+    """Which estimator, and how long the rest at the start must be."""
+
+    method: str = "filter"
+    rest_s: Positive = 8.0
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.method not in ESTIMATORS:
+            raise ValueError(f"method {self.method!r} is none of {', '.join(sorted(ESTIMATORS))}")
+        return self
+
+
+class FusionOfType(Section):
+    """Keys of a type of mock-up."""
+
+    fusion: FusionSection = FusionSection()
+
+
+class FusionOfVehicle(Section):
+    """Keys of a vehicle: whose fixes its estimator takes; the first source that it has, if none is named."""
+
+    fix_sources: tuple[str, ...] = ()

@@ -1,0 +1,27 @@
+"""What a rig says of the camera over the table."""
+
+from groundstation.declarations.rig_file import RigFile
+from groundstation.declarations.section import NonNegative, Positive, Section
+
+
+class OverheadCameraSection(Section):
+    """The camera over the table: where it is opened, its files, its delay and the floor of its errors.
+
+    ``circles`` says what each mock-up wears. The sigmas are what calibration of the camera and gluing of the
+    circles leave in every fix, beyond the covariance that comes with it.
+    """
+
+    address: str
+    camera: RigFile
+    circles: RigFile
+    delay_s: NonNegative = 0.0
+    delay_sigma_s: NonNegative = 0.002
+    timeout_s: Positive = 2.0
+    sigma_xy_m: Positive = 0.001
+    sigma_heading_rad: Positive = 0.003
+
+
+class OverheadOfRig(Section):
+    """Keys of the rig."""
+
+    overhead_camera: OverheadCameraSection | None = None

@@ -1,0 +1,46 @@
+"""The table of parts: those of the tree, then those of installed packages (entry points ``groundstation.parts``)."""
+
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+
+from groundstation.bus.journal import Journal
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.part import Part
+from groundstation.declarations.tables import PartError, Tables
+
+ENTRY_POINT_GROUP = "groundstation.parts"
+
+
+@cache
+def installed_tables() -> Tables:
+    """The tables of all parts; parts are imported at the first call.
+
+    Raises:
+        UsageError: A part of an installed package cannot be loaded or clashes with another.
+    """
+    from groundstation.parts.control.part import PART as CONTROL
+    from groundstation.parts.fusion.part import PART as FUSION
+    from groundstation.parts.imu.part import PART as IMU
+    from groundstation.parts.operation.part import PART as OPERATION
+    from groundstation.parts.overhead.part import PART as OVERHEAD
+    from groundstation.parts.reference.part import PART as REFERENCE
+    from groundstation.parts.stars.part import PART as STARS
+    from groundstation.parts.valves.part import PART as VALVES
+
+    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, REFERENCE)
+    points = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name)
+    try:
+        return Tables((*own, *map(_load, points)), topics=(Journal,))
+    except PartError as error:
+        raise UsageError(str(error)) from error
+
+
+def _load(point: EntryPoint) -> Part:
+    where = f"the part {point.name!r} ({point.value})"
+    try:
+        part = point.load()
+    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+        raise UsageError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
+    if not isinstance(part, Part):
+        raise UsageError(f"{where} is a {type(part).__name__}, expected a Part")
+    return part

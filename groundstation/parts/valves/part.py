@@ -1,0 +1,111 @@
+"""Part ``valves``: the wrench becomes pulses, one choice of them, guarded commands and frames on the bus."""
+
+from drivers.valve_bus.guard import Guard as Gate
+from drivers.valve_bus.valve_budget import OpenTimeLimits
+from groundstation.control.allocation import Allocator
+from groundstation.control.brake import BrakeConfig
+from groundstation.control.modulation import PulseConfig, PulseModulator
+from groundstation.control.mux import MuxConfig
+from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
+from groundstation.declarations.part import Part
+from groundstation.declarations.port import Port, PortRow
+from groundstation.declarations.rig import LABORATORY, Rig
+from groundstation.declarations.vehicle_type import VehicleType
+from groundstation.parts.valves.actions import FLOAT_AIR, GUARD, MULTIPLEXER
+from groundstation.parts.valves.allocation import Allocation
+from groundstation.parts.valves.command_mux import CommandMux
+from groundstation.parts.valves.gauges import GAUGES
+from groundstation.parts.valves.guard import Guard
+from groundstation.parts.valves.messages import (
+    CanIn,
+    CanOut,
+    ValveCommand,
+    ValveDemand,
+    ValveSelection,
+    ValveStatus,
+    VehicleMode,
+)
+from groundstation.parts.valves.port import ValveBusPort
+from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
+from groundstation.parts.valves.valve_writer import ValveWriter
+
+
+def _modulator(type_: VehicleType) -> PulseModulator:
+    valves = type_.valves
+    config = PulseConfig(
+        period_s=valves.period_s,
+        min_on_s=valves.min_on_s,
+        open_delay_s=valves.open_delay_s,
+        close_delay_s=valves.close_delay_s,
+    )
+    return PulseModulator(Allocator(type_.model()), config)
+
+
+def _command_mux(rig: Rig, vehicle: str) -> Node:
+    """With modulators of its own for braking and for pushing by hand."""
+    type_ = rig.type_of(vehicle)
+    modulators = _modulator(type_), _modulator(type_)
+    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators, rig.table.keep_in())
+
+
+def _guard(rig: Rig, vehicle: str) -> Node:
+    limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
+    gate = Gate(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
+    return Guard(vehicle, gate, frozenset(rig.tables.actions))
+
+
+def _valve_writer(rig: Rig, vehicle: str) -> Node:
+    return ValveWriter(vehicle, rig.vehicle(vehicle, ValvesOfVehicle).bus_index)
+
+
+def _allocation(rig: Rig, vehicle: str) -> Node:
+    return Allocation(vehicle, _modulator(rig.type_of(vehicle)))
+
+
+def _port(rig: Rig, vehicle: str) -> Port:
+    del vehicle
+    return ValveBusPort("valve_bus", "", rig.section(ValvesOfRig).valve_bus, tuple(rig.vehicles))
+
+
+def _check(rig: Rig) -> None:
+    bus = rig.section(ValvesOfRig).valve_bus
+    if isinstance(bus, str):
+        if not bus.startswith(LABORATORY):
+            raise ValueError(f"valve_bus: expected a table with 'interface' and 'channel', found {bus!r}")
+        if rig.laboratory is None:
+            raise ValueError(f"valve_bus: {bus!r} needs a [laboratory] section")
+    else:
+        import can
+
+        interface = bus.get("interface")
+        for key in ("interface", "channel"):
+            if key not in bus:
+                raise ValueError(f"valve_bus: the key {key!r} is missing")
+        if interface not in can.VALID_INTERFACES:
+            known = ", ".join(sorted(can.VALID_INTERFACES))
+            raise ValueError(f"valve_bus.interface: {interface!r} is none of python-can's: {known}")
+    owners: dict[int, str] = {}
+    for name in rig.vehicles:
+        index = rig.vehicle(name, ValvesOfVehicle).bus_index
+        if index in owners:
+            raise ValueError(f"vehicles.{name}.bus_index: {index} is already that of {owners[index]}")
+        owners[index] = name
+
+
+PART = Part(
+    name="valves",
+    summary="the wrench becomes pulses; one source is chosen, guarded and sent over the valve bus",
+    topics=(CanIn, ValveStatus, VehicleMode, ValveDemand, ValveSelection, ValveCommand, CanOut),
+    nodes=(
+        NodeRow("command_mux", COMMANDS, Weight.URGENT, _command_mux),
+        NodeRow("guard", COMMANDS, Weight.URGENT, _guard),
+        NodeRow("valve_writer", COMMANDS, Weight.URGENT, _valve_writer),
+        NodeRow("allocation", FLIGHT, Weight.LIGHT, _allocation),
+    ),
+    ports=(PortRow("valve_writer", _port, is_of_rig=True),),
+    actions=(*GUARD.values(), *MULTIPLEXER.values(), *FLOAT_AIR.values()),
+    rig=ValvesOfRig,
+    vehicle=ValvesOfVehicle,
+    check=_check,
+    gauges=GAUGES,
+)

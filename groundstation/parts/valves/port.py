@@ -1,0 +1,51 @@
+"""The CAN bus that all valve nodes share."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from drivers.laboratory import CanFrame
+from groundstation.declarations.message import Message
+from groundstation.declarations.port import READ_TIMEOUT_S, Edge, Port
+from groundstation.parts.valves.messages import CanIn, CanOut
+
+
+class _CanEdge(Edge):
+    def __init__(self, config: Mapping[str, object]) -> None:
+        from drivers.valve_bus.port import ValveBusPort as ValveBusDriver
+
+        self._bus = ValveBusDriver(config)
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        found = self._bus.read(READ_TIMEOUT_S)
+        return () if found is None else (found,)
+
+    def write(self, data: bytes | CanFrame) -> None:
+        assert isinstance(data, CanFrame)
+        self._bus.send(data)
+
+    def close(self) -> None:
+        self._bus.close()
+
+
+@dataclass(frozen=True)
+class ValveBusPort(Port):
+    """Frames of all vehicles in both directions."""
+
+    reads = CanIn
+
+    vehicles: tuple[str, ...]
+
+    def to_message(self, stamp_ns: int, data: object) -> Message:
+        assert isinstance(data, CanFrame)
+        return CanIn(stamp_ns, "", data.arbitration_id, data.data)
+
+    def writes(self) -> tuple[tuple[type[Message], str], ...]:
+        return tuple((CanOut, vehicle) for vehicle in self.vehicles)
+
+    def to_device(self, payload: Message) -> bytes | CanFrame:
+        assert isinstance(payload, CanOut)
+        return CanFrame(payload.arbitration_id, payload.data)
+
+    def open(self) -> Edge:
+        assert isinstance(self.address, Mapping)
+        return _CanEdge(self.address)
