@@ -10,7 +10,6 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.bus.topics import topic_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import whole_folder, write_picture
 from groundstation.parts.stars.messages import StarMatches, StarPicture

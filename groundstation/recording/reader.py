@@ -20,8 +20,8 @@ from mcap.summary import Summary
 
 from groundstation.bus.cdr import CodecError
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.declarations.topic import Topic
 from groundstation.declarations.message import Message
+from groundstation.declarations.topic import Topic
 from groundstation.recording.channels import parse_channel
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import FORMAT, METADATA_NAME, RecordingInfo
@@ -141,7 +141,11 @@ class Recording:
         """
         by_noun = {kind.TOPIC.noun: kind for kind in kinds}
         wanted = {
-            number: (by_noun[noun].TOPIC, owner, decoder_of(by_noun[noun], schema, f"{self.path}: /{owner}/{noun}"))
+            number: (
+                by_noun[noun].TOPIC,
+                owner,
+                decoder_of(by_noun[noun], schema, f"{self.path}: /{owner}/{noun}"),
+            )
             for number, (noun, owner, schema) in self._known.items()
             if noun in by_noun and (owners is None or owner in owners)
         }

@@ -18,8 +18,8 @@ from mcap.writer import CompressionType, Writer
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.record_stream import Recorded
-from groundstation.declarations.message import Message
 from groundstation.bus.ros_schema import ENCODING, schema_text
+from groundstation.declarations.message import Message
 from groundstation.recording.channels import channel_name
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo

@@ -151,5 +151,3 @@ def resolved_ports(rig: Rig, process: str, addresses: Mapping[str, object]) -> l
 def _check_channel(channel: str, known: Collection[str]) -> None:
     if channel not in known:
         raise RigError(f"the laboratory has no channel {channel!r} (it has: {', '.join(sorted(known))})")
-
-

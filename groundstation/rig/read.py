@@ -52,9 +52,7 @@ def read_text(path: Path) -> str:
         raise RigError(f"{path}: cannot be read as a rig file ({error})") from error
 
 
-def parse_rig(
-    text: str, path: Path, files: RigFiles | None = None, tables: Tables | None = None
-) -> Rig:
+def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tables | None = None) -> Rig:
     """Read the text of a rig file.
 
     Args:

@@ -9,12 +9,12 @@ from collections import deque
 from collections.abc import Callable, Collection
 
 from groundstation.bus.journal import Journal, Kind, packed_entries, read_entries
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.node import Node
 from groundstation.recording.policy import is_kept
 from groundstation.recording.reader import Recorded, Recording
 from groundstation.recording.writer import Recorder
-from groundstation.declarations.errors import UsageError
-from groundstation.runners.replay_comparison import Comparison, EXACT, Tolerances
+from groundstation.runners.replay_comparison import EXACT, Comparison, Tolerances
 from groundstation.runners.replay_node import NodeFactory, ReplayedNode
 from groundstation.runners.replay_report import ReplayReport
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.bus.envelope import Envelope
-from groundstation.declarations.message import Message
 from groundstation.bus.cdr import codec_of, ros_fields
+from groundstation.bus.envelope import Envelope
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recorded
 from groundstation.recording.writer import Recorder
-from groundstation.declarations.errors import UsageError
 from groundstation.runners.replay_report import Difference, TopicResult
 
 Tolerances = Mapping[str, Mapping[str, float]]

@@ -121,9 +121,7 @@ class Slot:
 
     def drop(self, envelope: Envelope, now_ns: int) -> None:
         """Journal that a newer message replaced this one before the node was free."""
-        self.journal.note(
-            Kind.DROP, self.key, envelope.topic.noun, envelope.owner, envelope.sequence, now_ns
-        )
+        self.journal.note(Kind.DROP, self.key, envelope.topic.noun, envelope.owner, envelope.sequence, now_ns)
 
     def _wrap(self, made: Iterable[Message], now_ns: int, trigger: Cause | None) -> list[Delivered]:
         wall_ns = cpu_ns = 0

@@ -185,7 +185,5 @@ def build_slots(
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
         node = row.make(rig, vehicle)
-        slots.append(
-            Slot(row.key(vehicle), node, process or name, crc, journal, sequences, measure, timing)
-        )
+        slots.append(Slot(row.key(vehicle), node, process or name, crc, journal, sequences, measure, timing))
     return slots

@@ -9,15 +9,15 @@ from groundstation.control.controller import Controller as ControlLaw
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
 from groundstation.control.state import Wrench as BodyWrench
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
-from groundstation.declarations.message import Message
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
-from groundstation.declarations.node import Node
 
 STALE_NS = 300_000_000
 STATUS_EVERY = 2
@@ -137,9 +137,15 @@ class Controller(Node):
         return ""
 
     def _status(self, state: ControlState, now_ns: int) -> ControlStatus:
-        goal = self._goal
-        distance = math.dist(state.position_table_m, goal.position_table_m)
-        turn = wrap_angle(goal.heading_rad - state.heading_rad)
+        setpoint = self._law.setpoint(self._goal)
+        distance_m = math.dist(state.position_table_m, setpoint.position_table_m)
+        turn_rad = wrap_angle(setpoint.heading_rad - state.heading_rad)
         return ControlStatus(
-            now_ns, self.vehicle, self._name, goal.position_table_m, goal.heading_rad, distance, turn
+            now_ns,
+            self.vehicle,
+            self._name,
+            setpoint.position_table_m,
+            setpoint.heading_rad,
+            distance_m,
+            turn_rad,
         )

@@ -2,9 +2,8 @@
 
 from groundstation.control.valve_push import ValvePush
 from groundstation.fusion.estimator import Estimator
-from groundstation.parts.imu.messages import Imu
+from groundstation.parts.imu.messages import USABLE_FORCE_X, USABLE_FORCE_Y, Imu
 from groundstation.parts.valves.messages import ValveCommand
-from groundstation.parts.imu.messages import USABLE_FORCE_X, USABLE_FORCE_Y
 
 _FORCES = USABLE_FORCE_X | USABLE_FORCE_Y
 

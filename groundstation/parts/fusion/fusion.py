@@ -6,21 +6,20 @@ from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.declarations.fix import Floor, PoseFix
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
 from groundstation.fusion.error_state_filter import WAITS
 from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
-from groundstation.declarations.fix import Floor, PoseFix
-from groundstation.declarations.message import Message
-from groundstation.declarations.request import Request
+from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
-from groundstation.parts.imu.messages import Imu
+from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
-from groundstation.parts.imu.messages import USABLE_RATE
-from groundstation.parts.fusion.force_stand_in import ForceStandIn
-from groundstation.declarations.node import Node
 
 STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"

@@ -14,9 +14,9 @@ from drivers.imu_block.sensors import (
     usable_readings,
 )
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.parts.imu.messages import Imu, ImuBytes, ImuOrder, ImuRaw
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.declarations.node import Node
 
 PERIOD_NS = 1_000_000_000
 TICK_S = 1e-3

@@ -7,11 +7,11 @@ a vehicle that somebody stopped or disarmed.
 from collections.abc import Iterator
 
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.parts.fusion.messages import FusionStatus
 from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.valves.messages import ValveStatus, VehicleMode
-from groundstation.declarations.node import Node
 
 PERIOD_NS = 100_000_000
 PATIENCE_NS = 1_000_000_000

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from groundstation.frames import wrap_angle
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.frames import wrap_angle
+from groundstation.fusion.state_memory import StateMemory
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.overhead.messages import FixComparison, OverheadFix
 from groundstation.parts.stars.messages import StarFix
-from groundstation.declarations.node import Node
-from groundstation.fusion.state_memory import StateMemory
 from groundstation.star_tracking.comparison import Referee
 
 REACH_NS = 120_000_000

@@ -4,8 +4,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from groundstation.declarations.fix import PoseFix
-from groundstation.declarations.message import F64, PACKAGE, U8, U16, U32, Bool, Bytes, Float64x3, Float64x9, Message, Text
+from groundstation.declarations.message import (
+    F64,
+    I64,
+    PACKAGE,
+    U16,
+    U32,
+    Bytes,
+    Float64x3,
+    Message,
+    Text,
+)
 from groundstation.declarations.topic import Delivery, Rank, Recorded, Scope, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OverheadImage(Message):

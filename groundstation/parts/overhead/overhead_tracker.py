@@ -7,16 +7,16 @@ from collections.abc import Iterator, Sequence
 import cv2
 import numpy as np
 
-from groundstation.frames import wrap_angle
 from drivers.star_camera.exposure import ExposureDelay
-from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.message import Message
-from groundstation.parts.operation.messages import CalibrationInUse
-from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
 from groundstation.declarations.node import Node
+from groundstation.declarations.rig_file import RigFile
+from groundstation.frames import wrap_angle
+from groundstation.overhead import tracker as overhead
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead import tracker as overhead
+from groundstation.parts.operation.messages import CalibrationInUse
+from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
 
 
 class OverheadTracker(Node):
@@ -35,12 +35,16 @@ class OverheadTracker(Node):
     inputs = (OverheadImage,)
     outputs = (OverheadFix, CalibrationInUse)
 
-    def __init__(self, vehicles: Sequence[str], camera: RigFile, circles: RigFile, delay: ExposureDelay) -> None:
+    def __init__(
+        self, vehicles: Sequence[str], camera: RigFile, circles: RigFile, delay: ExposureDelay
+    ) -> None:
         super().__init__("")
         cv2.setNumThreads(1)  # results must not depend on the number of cores
         self._vehicles = tuple(vehicles)
         self._files = (camera, circles)
-        self._tracker = overhead.OverheadTracker(camera.value(OverheadCamera.load), circles.value(load_liveries))
+        self._tracker = overhead.OverheadTracker(
+            camera.value(OverheadCamera.load), circles.value(load_liveries)
+        )
         self._delay = delay
 
     def start(self, now_ns: int) -> Iterator[Message]:

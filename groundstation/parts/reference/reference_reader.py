@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from drivers.reference.protocol import PoseParser
 from groundstation.declarations.message import Message
-from groundstation.parts.reference.messages import ReferenceBytes, ReferenceState
 from groundstation.declarations.node import Node
+from groundstation.parts.reference.messages import ReferenceBytes, ReferenceState
 
 
 class ReferenceReader(Node):

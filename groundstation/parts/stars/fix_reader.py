@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 from drivers.reference.protocol import PoseParser
-from groundstation.frames import wrap_angle
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request, answer
+from groundstation.frames import wrap_angle
 from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.messages import FixBytes, StarFix
-from groundstation.declarations.node import Node
 
 
 class FixReader(Node):

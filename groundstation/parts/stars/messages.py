@@ -4,8 +4,22 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from groundstation.declarations.fix import PoseFix
-from groundstation.declarations.message import F64, I64, PACKAGE, U8, U16, U32, Bool, Bytes, Float32Array, Float64x3, Float64x9, Message, Text, TextSequence
+from groundstation.declarations.message import (
+    F64,
+    I64,
+    PACKAGE,
+    U16,
+    U32,
+    Bool,
+    Bytes,
+    Float32Array,
+    Float64x3,
+    Message,
+    Text,
+    TextSequence,
+)
 from groundstation.declarations.topic import Delivery, Rank, Recorded, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarImage(Message):

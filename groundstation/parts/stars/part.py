@@ -103,9 +103,7 @@ def _check(rig: Rig) -> None:
     for name, vehicle in rig.vehicles.items():
         own = rig.vehicle(name, StarsOfVehicle)
         if own.star_camera is not None and rig.of_type(name, StarsOfType).star_camera is None:
-            raise ValueError(
-                f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera"
-            )
+            raise ValueError(f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera")
         check_address(rig, f"vehicles.{name}.star_camera", own.star_camera)
         check_address(rig, f"vehicles.{name}.fixes", own.fixes)
 

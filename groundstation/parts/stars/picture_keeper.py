@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 
 from groundstation.declarations.message import Message
-from groundstation.parts.stars.messages import StarImage, StarMatches, StarPicture
 from groundstation.declarations.node import Node
+from groundstation.parts.stars.messages import StarImage, StarMatches, StarPicture
 
 MEMORY_NS = 3_000_000_000
 MOST_FRAMES = 48

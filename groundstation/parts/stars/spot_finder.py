@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.declarations.message import Message
-from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.declarations.node import Node
+from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError
 
 _NONE = np.empty(0, np.float32)
@@ -82,7 +82,9 @@ class SpotFinder(Node):
 
     def _unusable(self, image: StarImage, reason: str) -> StarSpots:
         none = (_NONE,) * 6
-        return StarSpots(image.stamp_ns, self.vehicle, image.device_stamp_ns, *none, 0.0, 0.0, 0, 0, False, reason)
+        return StarSpots(
+            image.stamp_ns, self.vehicle, image.device_stamp_ns, *none, 0.0, 0.0, 0, 0, False, reason
+        )
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 
 from drivers.star_camera.exposure import ExposureDelay
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.declarations.rig_file import RigFile
+from groundstation.fusion.state_memory import StateMemory
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.operation.messages import CalibrationInUse
+from groundstation.parts.stars import star_answers
 from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.messages import SkyChange, StarFix, StarMatches, StarSpots
-from groundstation.parts.stars import star_answers
-from groundstation.declarations.node import Node
 from groundstation.parts.stars.picture_choice import PictureChoice
-from groundstation.fusion.state_memory import StateMemory
 from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots

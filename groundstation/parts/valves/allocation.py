@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
-from groundstation.declarations.node import Node
 
 
 class Allocation(Node):

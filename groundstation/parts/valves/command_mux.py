@@ -13,11 +13,11 @@ from groundstation.control.state import ControlState
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.control.vehicle import VehicleModel
 from groundstation.declarations.message import Message
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
-from groundstation.parts.valves.actions import MULTIPLEXER
-from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.valves.messages import ValveDemand, ValveSelection
 from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.valves.actions import MULTIPLEXER
+from groundstation.parts.valves.messages import ValveDemand, ValveSelection
 
 PERIOD_NS = 20_000_000
 CLOSED = bytes(8)

@@ -8,11 +8,11 @@ from drivers.valve_bus.guard_account import Verdict
 from drivers.valve_bus.messages import Arm, StopReason
 from drivers.valve_bus.messages import ValveCommand as Command
 from groundstation.declarations.message import Message
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
-from groundstation.parts.valves.actions import GUARD
-from groundstation.parts.operation.messages import Diagnostics
-from groundstation.parts.valves.messages import NO_STOP, ValveCommand, ValveSelection, VehicleMode
 from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.valves.actions import GUARD
+from groundstation.parts.valves.messages import NO_STOP, ValveCommand, ValveSelection, VehicleMode
 
 PERIOD_NS = 20_000_000
 DIAGNOSTICS_EVERY = 50

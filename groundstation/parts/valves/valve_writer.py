@@ -7,10 +7,10 @@ from drivers.valve_bus import messages as bus
 from drivers.valve_bus.frame import CanFrame
 from drivers.valve_bus.protocol import decode, encode
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.parts.valves.actions import FLOAT_AIR
-from groundstation.parts.valves.messages import CanIn, CanOut, NO_STOP, ValveCommand, ValveStatus
-from groundstation.declarations.node import Node
+from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
 
 FLOAT_RETRY_NS = 100_000_000
 
