@@ -1,8 +1,8 @@
 """The latency ledger: how old the light and the inertia are at every stage, from envelopes and causes.
 
 Two chains per vehicle. *Light*: middle of the exposure (as the star tracker concluded it), arrival of
-the picture, spots, fix, first state that holds the fix, first wrench from such a state, past the guard, CAN frame.
-*Inertia*: bytes arrived, state published.
+the picture, spots, fix, first state that holds the fix, first wrench from such a state, past the guard,
+CAN frame. *Inertia*: bytes arrived, state published.
 
 The first cause of a message is what triggered it, so the origin of a message (an exposure, an arrival of
 bytes) is that of its first cause. Record streams of several processes come one before the other: a message
