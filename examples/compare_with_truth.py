@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.bus.topics import topic_of
-from groundstation.messages.definitions import ReferenceState, VehicleState
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.reference.messages import ReferenceState
 from groundstation.recording.reader import Recording
 
 
 def states(recording: Recording, vehicle: str) -> np.ndarray:
     """Rows of t (s), x, y (m), heading (rad, unwrapped) and their standard deviations, shape (n, 7)."""
-    found = (message.payload for message in recording.messages([topic_of(VehicleState)], [vehicle]))
+    found = (message.payload for message in recording.messages([VehicleState.TOPIC], [vehicle]))
     said = [state for state in found if isinstance(state, VehicleState)]
     rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad, *s.pose_std) for s in said])
     rows[:, 3] = np.unwrap(rows[:, 3])
@@ -25,7 +26,7 @@ def states(recording: Recording, vehicle: str) -> np.ndarray:
 
 def truths(recording: Recording, vehicle: str) -> np.ndarray:
     """Rows of t (s), x, y (m), heading (rad, unwrapped), shape (n, 4)."""
-    found = (message.payload for message in recording.messages([topic_of(ReferenceState)], [vehicle]))
+    found = (message.payload for message in recording.messages([ReferenceState.TOPIC], [vehicle]))
     said = [truth for truth in found if isinstance(truth, ReferenceState)]
     rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad) for s in said])
     rows[:, 3] = np.unwrap(rows[:, 3])
@@ -54,7 +55,7 @@ def main() -> None:
     parser.add_argument("recording", type=Path)
     with Recording(parser.parse_args().recording) as recording:
         for channel in recording.channels:
-            if channel.topic is topic_of(ReferenceState):
+            if channel.topic is ReferenceState.TOPIC:
                 state, truth = states(recording, channel.owner), truths(recording, channel.owner)
                 state = state[(state[:, 0] >= truth[0, 0]) & (state[:, 0] <= truth[-1, 0])]
                 off = sentence(errors(state, truth))

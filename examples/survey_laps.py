@@ -13,16 +13,19 @@ from pathlib import Path
 
 from drivers.laboratory import load_laboratory
 from groundstation.bus.journal import JournalWriter
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import ControlStatus, Request, SequencePhase
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.request import Request
+from groundstation.parts.control.messages import ControlStatus
+from groundstation.parts.operation.messages import SequencePhase
+from groundstation.declarations.node import Node
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.lockstep import LockstepRunner, Observer
+from groundstation.runners.lockstep import LockstepRunner, Observer
 from groundstation.runtime.node_table import build_slots
 from groundstation.runtime.ports import ports_of
-from groundstation.runtime.provenance import recording_info
-from groundstation.runtime.rig import Rig, load_rig
-from groundstation.runtime.slot import NodeSlot, Sequences
+from groundstation.rig.provenance import recording_info
+from groundstation.declarations.rig import Rig
+from groundstation.rig.read import load_rig
+from groundstation.runners.slot import NodeSlot, Sequences
 
 RIG = Path(__file__).parent / "rigs" / "survey_laps.toml"
 HALF_X_M, HALF_Y_M = 1.6, 1.1

@@ -24,7 +24,10 @@ from numpy.typing import NDArray
 from firmware_emulator.sky.scene import read_camera
 from groundstation.bus.envelope import Delivered
 from groundstation.control.vehicle import square_of_eight
-from groundstation.messages.definitions import ReferenceState, StarImage, ValveCommand, VehicleState
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.stars.messages import StarImage
+from groundstation.parts.valves.messages import ValveCommand
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import StarFix

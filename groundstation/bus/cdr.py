@@ -10,8 +10,8 @@ import struct
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from groundstation.declarations.message import Message
 from groundstation.bus.cdr_fields import Part, Run, parts, ros_fields
+from groundstation.declarations.message import Message
 
 __all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields"]
 

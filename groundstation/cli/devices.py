@@ -12,7 +12,7 @@ from serial.tools import list_ports
 
 from drivers.imu_block.identify import BAUDS, LISTEN_S, PortReport, ask_url
 from groundstation.cli.errors import UsageError
-from groundstation.runtime.rig import load_rig
+from groundstation.rig.read import load_rig
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 

@@ -10,11 +10,10 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.bus.topics import topic_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import whole_folder, write_picture
-from groundstation.messages.definitions import StarMatches, StarPicture
-from groundstation.nodes.star_answers import notes_of
+from groundstation.parts.stars.messages import StarMatches, StarPicture
+from groundstation.parts.stars.star_answers import notes_of
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.star_tracking.picture_drawing import draw_notes
@@ -47,7 +46,7 @@ def explained_pictures(recording: Recording) -> Iterator[ExplainedPicture]:
         RecordingError: The file cannot be read.
     """
     halves: dict[tuple[str, int], StarMatches | StarPicture] = {}
-    for message in recording.messages({topic_of(StarMatches), topic_of(StarPicture)}):
+    for message in recording.messages({StarMatches.TOPIC, StarPicture.TOPIC}):
         payload = message.payload
         key = (payload.vehicle, payload.stamp_ns)
         assert isinstance(payload, StarMatches | StarPicture)

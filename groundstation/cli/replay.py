@@ -10,19 +10,20 @@ from rich.console import Console
 from rich.table import Table
 
 from groundstation.cli.errors import UsageError
+from groundstation.declarations.node import Node
+from groundstation.declarations.rig import Rig
 from groundstation.files.errors import CalibrationFileError
-from groundstation.nodes.node import Node
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.software import software
 from groundstation.recording.writer import Recorder
+from groundstation.rig.provenance import calibration_hashes
+from groundstation.rig.read import parse_rig
+from groundstation.runners.replay import ReplayRunner
+from groundstation.runners.replay_comparison import EXACT, Tolerances, load_tolerances
+from groundstation.runners.replay_report import ReplayReport
 from groundstation.runtime.node_table import make_node
-from groundstation.runtime.provenance import calibration_hashes
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.replay_comparison import EXACT, Tolerances, load_tolerances
-from groundstation.runtime.replay_report import ReplayReport
-from groundstation.runtime.rig import Rig, parse_rig
 
 app = typer.Typer(rich_markup_mode=None)
 

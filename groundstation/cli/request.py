@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from groundstation.cli.errors import UsageError
-from groundstation.nodes.actions import ACTIONS
-from groundstation.runtime.asking import ask
-from groundstation.runtime.running import RunningRig, find_running
+from groundstation.declarations.request import ACTIONS
+from groundstation.launch.asking import ask
+from groundstation.launch.running import RunningRig, find_running
 
 _ACTIONS = "\n\n".join(
     " ".join([name, *(argument.replace("_rad", "_deg") for argument in row.arguments)]) + f": {row.summary}"

@@ -15,13 +15,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from groundstation.cli.errors import UsageError
 from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.declarations.errors import GroundStationError
+from groundstation.launch.live_run import LiveRun
 from groundstation.recording.writer import PART_SUFFIX
-from groundstation.runtime.errors import GroundStationError
-from groundstation.runtime.live_run import LiveRun
-from groundstation.runtime.lockstep_run import run_lockstep
+from groundstation.rig.plan import check_addresses, processes_of
+from groundstation.rig.read import load_rig
+from groundstation.runners.lockstep_run import run_lockstep
 from groundstation.runtime.node_table import check_rig
-from groundstation.runtime.plan import check_addresses, processes_of
-from groundstation.runtime.rig import load_rig
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -19,7 +19,7 @@ class Node(ABC):
     """Base of all nodes.
 
     Class attributes:
-        inputs: Payload classes it receives.
+        inputs: Payload classes it receives; a node may set them when it is made.
         outputs: Payload classes it may publish; the runner refuses others.
         trigger: What a message that is made in a tick was made from: the newest of this input. None
             where ticks report on the node itself.
@@ -29,7 +29,7 @@ class Node(ABC):
         tick_period_ns: 0 for a node that only answers messages.
     """
 
-    inputs: ClassVar[tuple[type[Message], ...]] = ()
+    inputs: tuple[type[Message], ...] = ()
     outputs: ClassVar[tuple[type[Message], ...]] = ()
     trigger: ClassVar[type[Message] | None] = None
 

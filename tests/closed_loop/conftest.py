@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.runtime.lockstep_run import make_runner
-from groundstation.runtime.rig import parse_rig
+from groundstation.runners.lockstep_run import make_runner
+from groundstation.rig.read import parse_rig
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 SHORT_REST = "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n"
@@ -41,7 +41,7 @@ class Flight:
 
     def counters(self, node):
         """The newest counters of a node, by name."""
-        from groundstation.messages.definitions import Diagnostics
+        from groundstation.parts.operation.messages import Diagnostics
 
         said = [row for row in self.said[Diagnostics] if row.node == node]
         return dict(zip(said[-1].keys, map(int, said[-1].values), strict=True)) if said else {}
@@ -49,7 +49,7 @@ class Flight:
     def off_goal(self, vehicle="alpha", start_s=0.0):
         """Truth against the held pose: distances (m) and turns (rad), one per reference sample."""
         from groundstation.frames import wrap_angle
-        from groundstation.messages.definitions import ReferenceState
+        from groundstation.parts.reference.messages import ReferenceState
 
         hold = self.rig.vehicles[vehicle].hold
         rows = self.of(ReferenceState, vehicle, start_s)

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import parse_rig
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"

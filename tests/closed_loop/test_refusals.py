@@ -9,13 +9,13 @@ from typer.testing import CliRunner
 from groundstation.bus.envelope import Delivered
 from groundstation.cli.errors import UsageError
 from groundstation.cli.recording import app
-from groundstation.messages import definitions as m
+from groundstation.parts.stars.messages import StarFix, StarMatches
 from groundstation.recording.reader import Recording
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.monitor import Monitor
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.watch.monitor import Monitor
 from groundstation.runtime.node_table import make_node
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.rig import parse_rig
+from groundstation.runners.replay import ReplayRunner
+from groundstation.rig.read import parse_rig
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "published.toml"
 MORE = """
@@ -58,8 +58,8 @@ def test_the_pictures_of_refusals_are_recorded_shown_and_replayed(flown, tmp_pat
         refused = 0
         for message in recording.messages():
             monitor.take(Delivered(message.envelope, message.payload), message.log_ns)
-            refused += isinstance(message.payload, m.StarFix) and not message.payload.fix
-        matches = [row.payload for row in recording.messages() if isinstance(row.payload, m.StarMatches)]
+            refused += isinstance(message.payload, StarFix) and not message.payload.fix
+        matches = [row.payload for row in recording.messages() if isinstance(row.payload, StarMatches)]
     assert monitor.vehicles["alpha"].refused == {"no light spots": refused}
     assert matches[0].basis == "state"
     assert len(matches[0].stars) > 10

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
-from groundstation.messages import definitions as m
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import parse_rig
+from groundstation.parts.stars.messages import SkyChange, StarFix
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
@@ -51,7 +51,7 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
         + fault("new_star", 3.0, 7.0, x_m=NEW_M[0], y_m=NEW_M[1]),
         rig="late_pipeline",
     ).run(10.0)
-    changes = flight.of(m.SkyChange)
+    changes = flight.of(SkyChange)
     assert all(change.stamp_ns > 3_000_000_000 for change in changes)
     first = {}
     for change in changes:
@@ -70,8 +70,8 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
     assert math.hypot(new.x_m - NEW_M[0], new.y_m - NEW_M[1]) < 3e-4
     assert new.sightings == 25
     assert 0.0 < new.place_cov[0] < 1e-7
-    assert all(fix.fix for fix in flight.of(m.StarFix))
-    mode_of = {fix.mode for fix in flight.of(m.StarFix, start_s=5.0)}
+    assert all(fix.fix for fix in flight.of(StarFix))
+    mode_of = {fix.mode for fix in flight.of(StarFix, start_s=5.0)}
     assert mode_of == {"tracking", "lost-in-space"}
 
 

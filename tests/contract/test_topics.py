@@ -20,9 +20,9 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from groundstation.bus.topics import TOPICS, topic_named, topic_of
-from groundstation.messages.base import Message
-from groundstation.messages.cdr import CodecError, ros_fields
-from groundstation.messages.ros_schema import ENCODING, register, schema_text
+from groundstation.declarations.message import Message
+from groundstation.bus.cdr import CodecError, ros_fields
+from groundstation.bus.ros_schema import ENCODING, register, schema_text
 
 rows = pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.noun)
 

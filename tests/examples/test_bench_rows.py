@@ -6,15 +6,16 @@ import pytest
 
 from drivers.laboratory import load_laboratory
 from groundstation.bus.journal import JournalWriter
-from groundstation.messages.definitions import Imu, ImuBytes, VehicleState
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.lockstep import LockstepRunner
+from groundstation.runners.lockstep import LockstepRunner
 from groundstation.runtime.node_table import build_slots
 from groundstation.runtime.ports import ports_of
-from groundstation.runtime.rig import load_rig
-from groundstation.runtime.slot import Sequences
+from groundstation.rig.read import load_rig
+from groundstation.runners.slot import Sequences
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,8 +10,8 @@ import pytest
 
 import groundstation.frames
 from firmware_emulator.faults import FAULT_KINDS
-from groundstation.runtime.plan import processes_of
-from groundstation.runtime.rig import load_rig, parse_rig
+from groundstation.rig.plan import processes_of
+from groundstation.rig.read import load_rig, parse_rig
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from groundstation.bus.journal import Kind, read_entries
 from groundstation.bus.topics import topic_of
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import Journal
+from groundstation.declarations.message import Message
+from groundstation.bus.journal import Journal
 from groundstation.recording.reader import Recording
 
 Made = dict[int, int]
@@ -21,7 +21,7 @@ def made_from(recording: Recording, node: str, heard: type[Message], said: type[
         heard: Payload class of the input.
         said: Payload class of the output.
     """
-    heard_index, said_index = topic_of(heard).index, topic_of(said).index
+    heard_index, said_index = heard.TOPIC.index, said.TOPIC.index
     made: Made = {}
     trigger: int | None = None
     for kind, topic, sequence in _entries(recording, node):
@@ -37,14 +37,14 @@ def made_from(recording: Recording, node: str, heard: type[Message], said: type[
 
 def consumed(recording: Recording, node: str, heard: type[Message]) -> set[int]:
     """Sequence numbers of the inputs of one class that a node took."""
-    index = topic_of(heard).index
+    index = heard.TOPIC.index
     entries = _entries(recording, node)
     return {sequence for kind, topic, sequence in entries if kind == Kind.INPUT and topic == index}
 
 
 def _entries(recording: Recording, node: str) -> Iterator[tuple[int, int, int]]:
     """Kind, row of the topic and sequence of each entry of one node, in order."""
-    for message in recording.messages([topic_of(Journal)]):
+    for message in recording.messages([Journal.TOPIC]):
         payload = message.payload
         assert isinstance(payload, Journal)
         if node in payload.names:

@@ -1,8 +1,8 @@
 """Seconds of flight per second of CPU in lockstep: nodes, runner and emulator, with and without recording."""
 
 from bench.rows import RIGS, Bench, CpuTime, Row
-from groundstation.runtime.lockstep_run import make_runner, run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.runners.lockstep_run import make_runner, run_lockstep
+from groundstation.rig.read import load_rig
 
 CASES = (
     ("fixes drawn from truth", "drawn_fixes.toml", 120.0, 40.0),

@@ -13,15 +13,16 @@ from pathlib import Path
 from bench.limits import at_most
 from bench.rows import RIGS, Bench, Row
 from groundstation.bus.envelope import Delivered
-from groundstation.bus.topics import Scope
-from groundstation.messages.base import Message
-from groundstation.nodes.node import Node
+from groundstation.declarations.topic import Scope
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.lockstep_run import run_lockstep
+from groundstation.runners.lockstep_run import run_lockstep
 from groundstation.runtime.node_table import make_node
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.rig import Rig, load_rig, parse_rig
+from groundstation.runners.replay import ReplayRunner
+from groundstation.declarations.rig import Rig
+from groundstation.rig.read import load_rig, parse_rig
 
 ORIGINAL = "alpha"
 NODES = ("imu_reader", "fusion")

@@ -5,10 +5,10 @@ from pathlib import Path
 from bench.rows import RIGS, Bench, CpuTime, Row
 from drivers.imu_block.protocol import FrameParser, ImuFrame, encode_v1
 from groundstation.bus.topics import topic_of
-from groundstation.messages.definitions import ImuBytes
+from groundstation.parts.imu.messages import ImuBytes
 from groundstation.recording.reader import Recording
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 
 STREAM_HZ = 1000.0
 LIMIT = 100.0
@@ -22,7 +22,7 @@ def recorded_chunks(folder: Path) -> list[bytes]:
     path, rig = folder / "parser.mcap", RIGS / "drawn_fixes.toml"
     run_lockstep(load_rig(rig), rig, path, RECORDED_S, 1, lambda _text, _done: None)
     with Recording(path) as recording:
-        found = [message.payload for message in recording.messages([topic_of(ImuBytes)])]
+        found = [message.payload for message in recording.messages([ImuBytes.TOPIC])]
     return [said.data for said in found if isinstance(said, ImuBytes)]
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from bench.rows import RIGS, Bench, Row
 from groundstation.recording.reader import Recording
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.report import summarise
-from groundstation.runtime.rig import load_rig
-from groundstation.runtime.tracks import read_tracks
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.watch.report import summarise
+from groundstation.rig.read import load_rig
+from groundstation.watch.tracks import read_tracks
 
 FLOWN_S = 120.0
 

@@ -23,7 +23,13 @@ def _fusion(rig: Rig, vehicle: str) -> Node:
     stand_in = ForceStandIn(estimator, push, type_.mass_kg, type_.inertia_kg_m2)
     payloads = {name: rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle)}
     return Fusion(
-        vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration_texts(rig, vehicle), stand_in
+        vehicle,
+        estimator,
+        method,
+        payloads,
+        floors_of(rig, vehicle),
+        calibration_texts(rig, vehicle),
+        stand_in,
     )
 
 

@@ -83,9 +83,7 @@ PART = Part(
         NodeRow("fix_referee", STATION, Weight.LIGHT, _referee, _has_two_sources),
     ),
     ports=(PortRow("overhead_tracker", _port, is_of_rig=True),),
-    fix_sources=(
-        FixSource("overhead", OverheadFix, _has_camera, _floor, "an [overhead_camera] section"),
-    ),
+    fix_sources=(FixSource("overhead", OverheadFix, _has_camera, _floor, "an [overhead_camera] section"),),
     rig=OverheadOfRig,
     check=_check,
     gauges=GAUGES,

@@ -7,8 +7,8 @@ from groundstation.declarations.fix import FixSource, Floor
 from groundstation.declarations.node import FLIGHT, SKY, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
-from groundstation.declarations.request import Action
 from groundstation.declarations.rig import Rig, check_address
+from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.fix_reader import FixReader
 from groundstation.parts.stars.gauges import GAUGES
 from groundstation.parts.stars.messages import (
@@ -24,8 +24,6 @@ from groundstation.parts.stars.port import FixStreamPort, StarCameraPort
 from groundstation.parts.stars.sections import StarCameraSection, StarsOfType, StarsOfVehicle
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
-
-PICTURE = Action("picture", "star_tracker", "keep the next picture of the star camera, with its stars named")
 
 
 def _has_camera(rig: Rig, vehicle: str) -> bool:
@@ -105,9 +103,7 @@ def _check(rig: Rig) -> None:
     for name, vehicle in rig.vehicles.items():
         own = rig.vehicle(name, StarsOfVehicle)
         if own.star_camera is not None and rig.of_type(name, StarsOfType).star_camera is None:
-            raise ValueError(
-                f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera"
-            )
+            raise ValueError(f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera")
         check_address(rig, f"vehicles.{name}.star_camera", own.star_camera)
         check_address(rig, f"vehicles.{name}.fixes", own.fixes)
 

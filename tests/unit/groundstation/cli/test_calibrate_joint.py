@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import TableMap
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 TILT = (0.0003, -0.0001)

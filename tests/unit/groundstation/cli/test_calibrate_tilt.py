@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from groundstation.cli.calibrate import app
 from groundstation.cli.errors import UsageError
-from groundstation.runtime.estimation import rig_noise
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.parts.fusion.estimation import rig_noise
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 SCALE = (0.02, -0.03)

@@ -7,8 +7,8 @@ import pytest
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import topic_of
 from groundstation.cli.vehicle_rows import LABELS, line_of, rows_of
-from groundstation.messages import definitions as m
-from groundstation.runtime.monitor import Monitor
+from groundstation.parts.stars.messages import SkyChange, StarFix
+from groundstation.watch.monitor import Monitor
 
 SECOND_NS = 1_000_000_000
 
@@ -19,13 +19,13 @@ def monitor():
 
 
 def tell(monitor, payload):
-    topic = topic_of(type(payload))
+    topic = payload.TOPIC
     monitor.take(Delivered(Envelope(topic, "alpha", 1, payload.stamp_ns), payload), payload.stamp_ns)
 
 
 def fix(second, reason=""):
     pose = (math.nan,) * 3 if reason else (1.0, 2.0, 0.5)
-    return m.StarFix(second * SECOND_NS, "alpha", not reason, *pose, (0.0,) * 9, 0.0, 9, "tracking", reason)
+    return StarFix(second * SECOND_NS, "alpha", not reason, *pose, (0.0,) * 9, 0.0, 9, "tracking", reason)
 
 
 def refused(monitor, second):
@@ -61,7 +61,7 @@ def test_with_a_fix_again_only_the_counts_remain(monitor):
     ],
 )
 def test_changes_of_the_sky_are_said_with_what_follows(monitor, change, star, words):
-    tell(monitor, m.SkyChange(SECOND_NS, "alpha", change, star, 1.0, 2.0, (1e-8, 0.0, 1e-8), 25))
+    tell(monitor, SkyChange(SECOND_NS, "alpha", change, star, 1.0, 2.0, (1e-8, 0.0, 1e-8), 25))
     (line,) = monitor.take_lines()
     assert words in line
 

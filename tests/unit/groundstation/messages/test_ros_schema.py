@@ -4,14 +4,15 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from groundstation.bus.topics import TOPICS
-from groundstation.messages import definitions as m
-from groundstation.messages.base import PACKAGE
-from groundstation.messages.ros_schema import is_standard, message_text, register, schema_text
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.stars.messages import StarFix, StarImage, StarPicture
+from groundstation.declarations.message import PACKAGE
+from groundstation.bus.ros_schema import is_standard, message_text, register, schema_text
 
 CLASSES = [topic.payload for topic in TOPICS]
 
 
-@pytest.mark.parametrize("cls", [m.StarImage, m.StarPicture, m.Wrench])
+@pytest.mark.parametrize("cls", [StarImage, StarPicture, Wrench])
 @pytest.mark.parametrize("store", [Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY, Stores.LATEST])
 def test_standard_types_are_worded_as_ros_words_them(cls, store):
     # ros_version: rosbags writes ROS 1 text by default
@@ -29,12 +30,12 @@ def test_generated_text_is_what_rosbags_makes_of_the_registered_type(cls):
 
 
 def test_the_header_stands_first_and_carries_the_vehicle():
-    assert message_text(m.StarFix).splitlines()[:3] == [
+    assert message_text(StarFix).splitlines()[:3] == [
         "std_msgs/Header header",
         "bool fix",
         "float64 x_m",
     ]
-    assert "string frame_id" in schema_text(m.StarFix)
+    assert "string frame_id" in schema_text(StarFix)
 
 
 def test_every_payload_class_has_a_type_name_of_its_own():

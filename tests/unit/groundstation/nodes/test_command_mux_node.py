@@ -8,8 +8,10 @@ from groundstation.control.keep_in import rectangle
 from groundstation.control.modulation import PulseConfig, PulseModulator
 from groundstation.control.mux import MuxConfig
 from groundstation.control.vehicle import VehicleModel, square_of_eight
-from groundstation.messages import definitions as m
-from groundstation.nodes.command_mux import CommandMux
+from groundstation.declarations.request import Ack, Request
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.valves.messages import ValveDemand
+from groundstation.parts.valves.command_mux import CommandMux
 
 MS = 1_000_000
 MODEL = VehicleModel(11.0, 0.25, square_of_eight())
@@ -32,15 +34,15 @@ def mux():
 
 
 def demand(on_ms, now_ns=0):
-    return m.ValveDemand(now_ns, "alpha", bytes(on_ms), (0.0, 0.0), 0.0)
+    return ValveDemand(now_ns, "alpha", bytes(on_ms), (0.0, 0.0), 0.0)
 
 
 def state(now_ns, position=(0.0, 0.0), velocity=(0.0, 0.0)):
-    return m.VehicleState(now_ns, "alpha", position, 0.0, velocity, 0.0, (1e-3, 1e-3, 1e-3), "flying", 1)
+    return VehicleState(now_ns, "alpha", position, 0.0, velocity, 0.0, (1e-3, 1e-3, 1e-3), "flying", 1)
 
 
 def request(action, *argument):
-    return m.Request(0, "alpha", 1, "operator", action, argument)
+    return Request(0, "alpha", 1, "operator", action, argument)
 
 
 def said(outputs, kind):
@@ -85,7 +87,7 @@ def test_a_vehicle_that_would_leave_the_table_is_braked_whatever_the_controller_
 
 def test_a_push_by_hand_outranks_the_controller_and_ends_by_itself(mux):
     list(mux.receive(state(0), 0))
-    (ack,) = said(mux.receive(request("push", 0.2, 0.0, 0.0, 0.3), 0), m.Ack)
+    (ack,) = said(mux.receive(request("push", 0.2, 0.0, 0.0, 0.3), 0), Ack)
     assert ack.accepted
     sources = []
     for step in range(1, 40):

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from groundstation.messages.definitions import OverheadFix, StarFix, VehicleState
-from groundstation.nodes.fix_referee import FixReferee
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.overhead.messages import OverheadFix
+from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.overhead.fix_referee import FixReferee
 from groundstation.star_tracking.comparison import MIN_PAIRS
 
 MS = 1_000_000

@@ -7,12 +7,13 @@ import pytest
 
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
-from groundstation.messages.definitions import CalibrationInUse, OverheadFix, OverheadImage
-from groundstation.nodes.overhead_tracker import OverheadTracker
-from groundstation.runtime.errors import RigError
-from groundstation.runtime.estimation import fused_floors_of
+from groundstation.parts.operation.messages import CalibrationInUse
+from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
+from groundstation.parts.overhead.overhead_tracker import OverheadTracker
+from groundstation.declarations.errors import RigError
+from groundstation.parts.fusion.estimation import fused_floors_of
 from groundstation.runtime.node_table import NODES, check_rig, key_of, make_node
-from groundstation.runtime.rig import parse_rig
+from groundstation.rig.read import parse_rig
 
 ROOT = Path(__file__).parents[4]
 FILES = ROOT / "calibration" / "rigs" / "emulated"

@@ -4,15 +4,20 @@ import numpy as np
 import pytest
 
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import Scope, topic_of
-from groundstation.messages import definitions as m
-from groundstation.messages.cdr import ros_fields
+from groundstation.bus.topics import topic_of
+from groundstation.declarations.topic import Scope
+from groundstation.bus.journal import Journal
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.imu.messages import ImuBytes
+from groundstation.parts.stars.messages import StarImage, StarSpots
+from groundstation.parts.valves.messages import CanIn
+from groundstation.bus.cdr import ros_fields
 
 PERIOD_NS = 10_000_000
 
 
 def envelope_of(payload, sequence, process, publish_ns):
-    topic = topic_of(type(payload))
+    topic = payload.TOPIC
     owner = process if topic.scope is Scope.PROCESS else payload.vehicle
     return Envelope(topic, owner, sequence, publish_ns)
 
@@ -20,7 +25,7 @@ def envelope_of(payload, sequence, process, publish_ns):
 def spots(stamp_ns, vehicle, some):
     """Three spots; every array of the payload holds ``some``."""
     empty = {"float32[]": some, "float64": 1.5, "int64": stamp_ns, "uint16": 3, "bool": False, "string": ""}
-    return m.StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(m.StarSpots)))
+    return StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(StarSpots)))
 
 
 def fly(steps: int, seed: int = 7) -> list[Delivered]:
@@ -37,15 +42,15 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     for step in range(steps):
         now_ns = (step + 1) * PERIOD_NS
         for vehicle in ("alpha", "bravo"):
-            say(m.ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
+            say(ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
             force = tuple(random.normal(size=2).tolist())
-            say(m.Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
-        say(m.CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
+            say(Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
+        say(CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
         if step % 7 == 0:
-            say(m.StarImage(now_ns, "alpha", 8, 8, "mono8", 0, 8, random.bytes(64)), now_ns)
+            say(StarImage(now_ns, "alpha", 8, 8, "mono8", 0, 8, random.bytes(64)), now_ns)
             say(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
         if step % 10 == 9:
-            say(m.Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
+            say(Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
     return flight
 
 

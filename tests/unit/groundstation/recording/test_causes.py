@@ -3,7 +3,7 @@ import pytest
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
 from groundstation.bus.topics import topic_named, topic_of
-from groundstation.messages.definitions import Journal
+from groundstation.bus.journal import Journal
 from groundstation.recording.causes import CauseIndex, Reference
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
@@ -15,7 +15,7 @@ IMU_BYTES, IMU, STATE, WRENCH = (topic_named(n).index for n in ("imu_bytes", "im
 
 def recording_with(journal: JournalWriter, tmp_path):
     path = tmp_path / "run.mcap"
-    topic = topic_of(Journal)
+    topic = Journal.TOPIC
     names, entries = journal.take()
     with Recorder(path, RecordingInfo()) as recorder:
         payload = Journal(1000, "", "lockstep", names, entries)

@@ -7,7 +7,7 @@ from groundstation.cli.recording import app
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 
 @pytest.fixture

@@ -8,16 +8,22 @@ import pytest
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import Scope, topic_of
-from groundstation.messages import definitions as m
-from groundstation.nodes.node import Node
+from groundstation.bus.topics import topic_of
+from groundstation.declarations.topic import Scope
+from groundstation.bus.journal import Journal
+from groundstation.declarations.request import Request
+from groundstation.parts.control.messages import ControlStatus, Wrench
+from groundstation.parts.imu.messages import ImuBytes
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.stars.messages import StarImage
+from groundstation.declarations.node import Node
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.replay import ReplayRunner, recorded_nodes
+from groundstation.declarations.errors import UsageError
+from groundstation.runners.replay import ReplayRunner, recorded_nodes
 
 STEP_NS = 10_000_000
 PROCESS = "alpha_flight"
@@ -26,8 +32,8 @@ PROCESS = "alpha_flight"
 class Adder(Node):
     """Adds up bytes with a gain: each answer depends on all that was heard before."""
 
-    inputs = (m.ImuBytes, m.Request)
-    outputs = (m.Wrench, m.Diagnostics, m.ControlStatus)
+    inputs = (ImuBytes, Request)
+    outputs = (Wrench, Diagnostics, ControlStatus)
     gain = 1.0 / 3.0
 
     def __init__(self, vehicle):
@@ -35,20 +41,20 @@ class Adder(Node):
         self.sum = 0.0
 
     def start(self, now_ns):
-        yield m.Diagnostics(now_ns, "", "adder", 0, "starting", (), ())
+        yield Diagnostics(now_ns, "", "adder", 0, "starting", (), ())
 
     def receive(self, message, now_ns):
-        if isinstance(message, m.Request):
+        if isinstance(message, Request):
             self.sum = 0.0
             return
         self.sum += self.gain * sum(message.data) + 1e-9 * now_ns
-        yield m.Wrench(message.stamp_ns, self.vehicle, self.sum, -0.0, float("nan"), 0.0, 0.0, self.sum / 7)
+        yield Wrench(message.stamp_ns, self.vehicle, self.sum, -0.0, float("nan"), 0.0, 0.0, self.sum / 7)
 
     def tick(self, now_ns):
-        yield m.ControlStatus(now_ns, self.vehicle, "adder", (self.sum, 0.0), 0.0, float("inf"), 0.0)
+        yield ControlStatus(now_ns, self.vehicle, "adder", (self.sum, 0.0), 0.0, float("inf"), 0.0)
 
     def stop(self, now_ns):
-        yield m.Diagnostics(now_ns, "", "adder", 0, "stopping", (), ())
+        yield Diagnostics(now_ns, "", "adder", 0, "stopping", (), ())
 
 
 @dataclass
@@ -64,7 +70,7 @@ class Laboratory:
     held: list = field(default_factory=list)
 
     def envelope(self, payload, now_ns):
-        topic = topic_of(type(payload))
+        topic = payload.TOPIC
         owner = PROCESS if topic.scope is Scope.PROCESS else payload.vehicle
         number = self.counts[topic.index, owner] = self.counts.get((topic.index, owner), 0) + 1
         return Envelope(topic, owner, number, now_ns)
@@ -103,7 +109,7 @@ class Laboratory:
 
     def say_journal(self, now_ns):
         names, entries = self.journal.take()
-        payload = m.Journal(now_ns, "", PROCESS, names, entries)
+        payload = Journal(now_ns, "", PROCESS, names, entries)
         self.write(self.envelope(payload, now_ns), payload, now_ns)
 
     def fly(self, steps, begin=0, vehicles=("alpha", "bravo")):
@@ -116,9 +122,9 @@ class Laboratory:
             now_ns = (step + 1) * STEP_NS
             self.publish(now_ns)
             for node in nodes:
-                self.hear(node, m.ImuBytes(now_ns, node.vehicle, random.bytes(9)), now_ns)
+                self.hear(node, ImuBytes(now_ns, node.vehicle, random.bytes(9)), now_ns)
                 if step % 13 == 7:
-                    self.hear(node, m.Request(now_ns, node.vehicle, step, "test", "zero", ()), now_ns)
+                    self.hear(node, Request(now_ns, node.vehicle, step, "test", "zero", ()), now_ns)
                 if step % 5 == 4:
                     self.call(node, Kind.TICK, node.tick(now_ns), now_ns)
                 if step % 6 == 1:
@@ -179,7 +185,7 @@ def test_an_unchanged_node_says_the_same_bit_for_bit(path):
 def test_the_replayed_file_holds_the_recorded_outputs(tmp_path, path):
     with Recorder(tmp_path / "again.mcap", RecordingInfo()) as output:
         replay(path, output=output)
-    topics = [topic_of(kind) for kind in Adder.outputs]
+    topics = [kind.TOPIC for kind in Adder.outputs]
     with Recording(path) as then, Recording(tmp_path / "again.mcap") as now:
         assert sorted(((r.envelope.topic.index, r.envelope.vehicle, r.envelope.sequence), r.data)
                       for r in then.messages(topics)) == sorted(
@@ -208,7 +214,7 @@ def test_a_changed_node_is_found_with_field_and_sequence(path):
                 if said.stamp_ns < 21 * STEP_NS:
                     yield said
                 else:
-                    yield m.Wrench(said.stamp_ns, said.vehicle, said.force_x_n, 0.0, 0.0, 0.0, 0.0, 9.0)
+                    yield Wrench(said.stamp_ns, said.vehicle, said.force_x_n, 0.0, 0.0, 0.0, 0.0, 9.0)
 
     report = replay(path, Changed, nodes=["alpha/adder"])
     result = next(r for r in report.results if r.noun == "wrench")
@@ -248,14 +254,14 @@ def test_silence_and_chatter_are_named(tmp_path, path):
         chatty = next(r for r in replay(path, Chatty, output=output).results if r.noun == "control_status")
     assert (chatty.equal, chatty.extra, chatty.agrees) == (12, 12, False)
     with Recording(tmp_path / "chatty.mcap") as now:
-        sequences = [r.envelope.sequence for r in now.messages([topic_of(m.ControlStatus)], ["alpha"])]
+        sequences = [r.envelope.sequence for r in now.messages([ControlStatus.TOPIC], ["alpha"])]
     assert sorted(sequences) == [0] * 12 + list(range(1, 13))
 
 
 def test_another_topic_than_recorded_is_a_difference(path):
     class Turned(Adder):
         def tick(self, now_ns):
-            yield m.Diagnostics(now_ns, "", "adder", 0, "", (), ())
+            yield Diagnostics(now_ns, "", "adder", 0, "", (), ())
 
     result = next(r for r in replay(path, Turned).results if r.noun == "control_status")
     assert result.different == 12
@@ -316,7 +322,7 @@ def test_a_node_that_is_not_in_the_journal_is_refused_with_those_that_are(path):
 
 def test_a_node_whose_images_were_not_kept_is_refused_in_one_sentence(tmp_path):
     class Looking(Adder):
-        inputs = (m.StarImage,)
+        inputs = (StarImage,)
 
     path = fly(tmp_path / "spots.mcap", info=RecordingInfo(images=ImagePolicy.SPOTS))
     with pytest.raises(UsageError, match="alpha/adder cannot be replayed: it hears star_image"):

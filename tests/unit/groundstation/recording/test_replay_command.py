@@ -9,12 +9,12 @@ from typer.testing import CliRunner
 from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import app as replay_app
 from groundstation.core.library import default_core
-from groundstation.messages import definitions as m
+from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.declarations.errors import UsageError
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 
 RIG = Path(__file__).parents[4] / "examples" / "rigs" / "drawn_fixes.toml"
 
@@ -65,7 +65,7 @@ def test_one_node_with_another_rig_is_compared_and_written(tmp_path, flight):
     code, said = call(flight, "--node", "alpha/fusion", "--rig", rig, "--out", out)
     assert code == 1
     assert "first difference in" in said
-    state = topic_of(m.VehicleState)
+    state = VehicleState.TOPIC
     with Recording(out) as now, Recording(flight) as then:
         assert now.info.rig_toml == changed
         assert [r.log_ns for r in now.messages([state])] == [r.log_ns for r in then.messages([state])]

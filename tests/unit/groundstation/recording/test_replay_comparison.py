@@ -5,15 +5,15 @@ import math
 import pytest
 
 from groundstation.bus.topics import topic_of
-from groundstation.messages import definitions as m
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.replay_comparison import difference, load_tolerances
+from groundstation.parts.control.messages import ControlStatus
+from groundstation.declarations.errors import UsageError
+from groundstation.runners.replay_comparison import difference, load_tolerances
 
-TOPIC = topic_of(m.ControlStatus)
+TOPIC = ControlStatus.TOPIC
 
 
 def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
-    return m.ControlStatus(5, "alpha", "station", position, heading_rad, error_m, 0.0)
+    return ControlStatus(5, "alpha", "station", position, heading_rad, error_m, 0.0)
 
 
 def compare(then, now, **allowed):
@@ -42,7 +42,7 @@ def test_infinity_is_close_to_itself():
 
 
 def test_texts_and_integers_have_no_tolerance():
-    then, now = status(), m.ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0)
+    then, now = status(), ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0)
     found = compare(then, now)[1]
     assert (found.field, found.recorded, found.replayed) == ("controller", "'station'", "'brake'")
     assert "sequence 3" in str(found)

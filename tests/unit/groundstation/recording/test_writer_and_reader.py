@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from groundstation.bus.topics import TOPICS, topic_named, topic_of
-from groundstation.messages import definitions as m
+from groundstation.parts.control.messages import Wrench
 from groundstation.recording.channels import channel_name, parse_channel
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
@@ -60,7 +60,7 @@ def test_two_equal_runs_give_equal_bytes(tmp_path, flight):
 
 def test_topics_and_owners_can_be_chosen(tmp_path, flight):
     with Recording(record(tmp_path / "a.mcap", flight)) as recording:
-        wrench = topic_of(m.Wrench)
+        wrench = Wrench.TOPIC
         found = list(recording.messages([wrench], ["bravo"]))
         assert [(r.envelope, r.data) for r in found] == [
             item for item in encoded(flight) if item[0].topic is wrench and item[0].vehicle == "bravo"
@@ -203,7 +203,7 @@ def test_a_viewer_reads_the_file(tmp_path, flight):
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"
         found = list(reader.iter_decoded_messages(topics=["/alpha/wrench"]))
-    wanted = [d.payload for d in flight if isinstance(d.payload, m.Wrench) and d.payload.vehicle == "alpha"]
+    wanted = [d.payload for d in flight if isinstance(d.payload, Wrench) and d.payload.vehicle == "alpha"]
     assert [f.decoded_message.wrench.force.x for f in found] == [w.force_x_n for w in wanted]
     assert {f.schema.name for f in found} == {"geometry_msgs/msg/WrenchStamped"}
 

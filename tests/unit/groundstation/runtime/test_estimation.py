@@ -11,11 +11,11 @@ from calibration.result import CalibrationResult, Provenance, Quantity
 from groundstation.fusion import error_state as es
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.runtime.errors import RigError
-from groundstation.runtime.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
+from groundstation.declarations.errors import RigError
+from groundstation.parts.fusion.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
 from groundstation.runtime.node_table import check_rig
-from groundstation.runtime.provenance import calibration_hashes
-from groundstation.runtime.rig import parse_rig
+from groundstation.rig.provenance import calibration_hashes
+from groundstation.rig.read import parse_rig
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)

@@ -6,9 +6,9 @@ import pytest
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import topic_of
-from groundstation.messages.definitions import FixComparison
-from groundstation.runtime.monitor import Monitor
-from groundstation.runtime.report import compared
+from groundstation.parts.overhead.messages import FixComparison
+from groundstation.watch.monitor import Monitor
+from groundstation.watch.report import compared
 
 
 def pair(verdict, reason="", difference=(0.001, 0.0, 0.0), nis=3.0):
@@ -17,7 +17,7 @@ def pair(verdict, reason="", difference=(0.001, 0.0, 0.0), nis=3.0):
 
 
 def test_the_view_speaks_when_sources_begin_to_disagree_and_when_they_agree_again():
-    monitor, topic = Monitor(("alpha",)), topic_of(FixComparison)
+    monitor, topic = Monitor(("alpha",)), FixComparison.TOPIC
     for number, said in enumerate(
         [
             pair("too few"),
