@@ -12,7 +12,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from groundstation.runtime.errors import GroundStationError
+from groundstation.declarations.errors import GroundStationError
 
 
 @dataclass(frozen=True)
