@@ -171,7 +171,9 @@ class ForkServer:
             self._popen.wait()
             self._popen = None
         elif self.pid is not None:
-            with contextlib.suppress(ChildProcessError, ProcessLookupError):  # it has ended and was waited for
+            with contextlib.suppress(
+                ChildProcessError, ProcessLookupError
+            ):  # it has ended and was waited for
                 os.kill(self.pid, signal.SIGKILL)
                 os.waitpid(self.pid, 0)
         self.pid = None

@@ -15,6 +15,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import zenoh
+from groundstation.rig.rig import Rig
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus, open_hub
@@ -25,7 +26,6 @@ from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
-from groundstation.rig.rig import Rig
 
 LABORATORY = "laboratory"
 COMMANDS = "commands"

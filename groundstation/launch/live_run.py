@@ -6,15 +6,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import TOPICS, Recorded, topic_named, topic_of
-from groundstation.bus.zenoh_bus import split_key
 from groundstation.messages import definitions as m
 from groundstation.messages.cdr import CodecError
 from groundstation.runtime.launcher import Launcher
 from groundstation.runtime.monitor import Monitor
 from groundstation.runtime.rig import Rig
 from groundstation.runtime.running import RunningRig
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.zenoh_bus import split_key
 
 LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05

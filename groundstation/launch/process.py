@@ -8,6 +8,8 @@ import sys
 import threading
 from collections.abc import Callable
 
+from groundstation.rig.node_table import build_slots
+
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
@@ -15,7 +17,6 @@ from groundstation.declarations.errors import GroundStationError, RigError, Usag
 from groundstation.files.errors import CalibrationFileError
 from groundstation.launch.child import REFUSAL
 from groundstation.launch.orders import Go, Orders
-from groundstation.rig.node_table import build_slots
 from groundstation.rig.plan import gives_way, resolved_ports
 from groundstation.rig.read import parse_rig
 from groundstation.runners.live import LiveProcess
