@@ -8,7 +8,7 @@ It shares codecs with the drivers, and no mathematics with the ground station.
     live/       the same on ptys, TCP and HTTP, by the host's clock
 
 `laboratory.EmulatedLaboratory` runs in virtual time, `python -m firmware_emulator RIG.toml` in real time. The
-scenario is the rig's `[laboratory]` table (`config`, `mock_up_config`, `faults`).
+scenario is the rig's `[laboratory]` table (`config`, `mock_up_config`, `failures`).
 
 Not modelled: the IMU block's firmware instruction by instruction, and with it the moments of the single SPI
 transfers within a poll (0.4 ms); vertical shocks, which would show in X + Y of the inclinometers; vehicles

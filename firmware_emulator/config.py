@@ -8,10 +8,10 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from drivers.valve_bus.protocol import MAX_VEHICLES
-from firmware_emulator.faults import FaultConfig
+from firmware_emulator.failures import FailureConfig
 from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.settings import Fraction, NonNegative, Pair, Positive, Settings
 
@@ -83,7 +83,10 @@ class LaboratoryConfig(Settings):
     vehicles: Annotated[tuple[VehicleConfig, ...], Field(min_length=1, max_length=MAX_VEHICLES)]
     overhead: OverheadConfig | None = None
     """The camera over the table, if there is one."""
-    faults: tuple[FaultConfig, ...] = ()
+    failures: Annotated[
+        tuple[FailureConfig, ...], Field(validation_alias=AliasChoices("failures", "faults"))
+    ] = ()
+    """What is injected, and when; `faults`, its older name, is still read."""
     bus_bitrate: Positive = 500_000.0
 
     def path(self, path: str) -> str:
@@ -95,9 +98,11 @@ class LaboratoryConfig(Settings):
         names = [vehicle.name for vehicle in self.vehicles]
         if len(set(names)) != len(names):
             raise ValueError(f"vehicles must have different names, got {', '.join(names)}")
-        for fault in self.faults:
-            if fault.vehicle not in names:
-                raise ValueError(f"fault {fault.kind!r} names vehicle {fault.vehicle!r}; there are {names}")
+        for failure in self.failures:
+            if failure.vehicle not in names:
+                raise ValueError(
+                    f"failure {failure.kind!r} names vehicle {failure.vehicle!r}; there are {names}"
+                )
         return self
 
     @model_validator(mode="after")

@@ -16,7 +16,7 @@ from firmware_emulator.devices.sky_renderer import SkyRenderer
 from firmware_emulator.devices.star_camera import Exposure, Renderer
 from firmware_emulator.devices.table_renderer import TableRenderer
 from firmware_emulator.devices.valve_bus import ValveBus
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.mock_up import MockUp, Random, build_mock_up
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.contacts import Contacts
@@ -73,7 +73,7 @@ class EmulatedLaboratory:
                 table,
                 surface,
                 floor,
-                Faults.of_vehicle(self.config.faults, vehicle.name),
+                Failures.of_vehicle(self.config.failures, vehicle.name),
                 self._random(index),
                 start_ns,
             )
@@ -208,7 +208,7 @@ class EmulatedLaboratory:
             config.exposure_s,
             config.delay_s,
             config.delay_jitter_s,
-            {m.name: Faults.of_vehicle(self.config.faults, m.name) for m in self.mock_ups},
+            {m.name: Failures.of_vehicle(self.config.failures, m.name) for m in self.mock_ups},
             np.random.default_rng(self._seeds(_TABLE_STREAM, 0, _OVERHEAD_PART)),
             start_ns,
         )

@@ -14,7 +14,7 @@ from firmware_emulator.devices.sensor_errors import SensorErrors, WarmUp, noise_
 from firmware_emulator.devices.serial_line import SerialLine
 from firmware_emulator.devices.star_camera import StarCamera
 from firmware_emulator.devices.valve_node import ValveNode
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.mock_up_config import CameraConfig, ImuConfig, VehicleConfig
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.body import Body
@@ -52,7 +52,7 @@ def build_mock_up(
     table: TableConfig,
     surface: Surface,
     floor: FloorPulses,
-    faults: Faults,
+    failures: Failures,
     random: Random,
     start_ns: int,
 ) -> MockUp:
@@ -64,7 +64,7 @@ def build_mock_up(
         table: For friction and bounds.
         surface: The table's surface, shared by all.
         floor: The floor's shocks, shared by all.
-        faults: Those that befall it.
+        failures: Those that befall it.
         random: Its random numbers.
         start_ns: Power-up.
     """
@@ -74,7 +74,7 @@ def build_mock_up(
     ppm = drawn_ppm if imu.clock_ppm is None else imu.clock_ppm
     grid = PollGrid(start_ns + GYRO_START_NS + round(phase), ppm)
     vehicle = _build_vehicle(config, table, surface, floor, grid, random("valves"), start_ns)
-    camera, fixes = _build_camera(index, config.camera, table, vehicle, faults, random, start_ns)
+    camera, fixes = _build_camera(index, config.camera, table, vehicle, failures, random, start_ns)
     truth = None
     if config.reference_rate_hz > 0.0:
         truth = TruthStream(index, vehicle, config.reference_rate_hz, config.reference_delay_s, start_ns)
@@ -83,11 +83,11 @@ def build_mock_up(
         vehicle,
         config.valves.minimum_on_ms,
         config.float_delay_s,
-        faults,
+        failures,
         random("node"),
         start_ns,
     )
-    block = _build_imu(index, imu, vehicle, grid, faults, random, start_ns)
+    block = _build_imu(index, imu, vehicle, grid, failures, random, start_ns)
     return MockUp(config.name, vehicle, block, node, camera, fixes, truth)
 
 
@@ -140,7 +140,7 @@ def _build_imu(
     config: ImuConfig,
     vehicle: Vehicle,
     grid: PollGrid,
-    faults: Faults,
+    failures: Failures,
     random: Random,
     start_ns: int,
 ) -> ImuBlock:
@@ -151,7 +151,7 @@ def _build_imu(
         config.outlier_rate_hz,
     )
     line = SerialLine(
-        config.baud, config.ftdi_latency_ms * 1e-3, config.host_jitter_s, faults, random("line"), start_ns
+        config.baud, config.ftdi_latency_ms * 1e-3, config.host_jitter_s, failures, random("line"), start_ns
     )
     return ImuBlock(
         vehicle,
@@ -162,7 +162,7 @@ def _build_imu(
         config.averaging,
         index + 1 if config.serial_number is None else config.serial_number,
         WarmUp(config.ambient_c, config.warm_up_k, config.warm_up_s),
-        faults,
+        failures,
         random("housekeeping"),
         start_ns,
     )
@@ -203,7 +203,7 @@ def _build_camera(
     config: CameraConfig,
     table: TableConfig,
     vehicle: Vehicle,
-    faults: Faults,
+    failures: Failures,
     random: Random,
     start_ns: int,
 ) -> tuple[StarCamera | None, FixStream | None]:
@@ -216,7 +216,7 @@ def _build_camera(
             config.readout_s,
             config.delay_s,
             config.delay_jitter_s,
-            faults,
+            failures,
             rng,
             start_ns,
         )
@@ -237,7 +237,7 @@ def _build_camera(
         config.delay_s,
         config.delay_jitter_s,
         errors,
-        faults,
+        failures,
         rng,
         start_ns,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.devices.star_camera import Pose
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
 
@@ -41,7 +41,7 @@ class OverheadCamera:
         exposure_s: How long a picture is exposed, all rows at once.
         delay_s: From the middle of the exposure until the picture is at the host.
         delay_jitter_s: Its standard deviation.
-        faults: Of each vehicle: `hidden_discs`.
+        failures: Of each vehicle: `hidden_discs`.
         rng: For the jitter.
         start_ns: First exposure begins half a period later, between those of star cameras of the same rate.
     """
@@ -53,11 +53,11 @@ class OverheadCamera:
         exposure_s: float,
         delay_s: float,
         delay_jitter_s: float,
-        faults: Mapping[str, Faults],
+        failures: Mapping[str, Failures],
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
-        self._vehicles, self._faults = dict(vehicles), dict(faults)
+        self._vehicles, self._failures = dict(vehicles), dict(failures)
         self._period_ns = round(NS_PER_S / rate_hz)
         self._open_ns = round(exposure_s * NS_PER_S)
         self._delay_ns = round(delay_s * NS_PER_S)
@@ -119,8 +119,8 @@ class OverheadCamera:
 
     def _hidden(self, age_ns: int) -> dict[str, int]:
         found = {}
-        for name, faults in self._faults.items():
-            fault = faults.active("hidden_discs", age_ns)
-            if fault is not None:
-                found[name] = int(fault.parameters["count"])
+        for name, failures in self._failures.items():
+            failure = failures.active("hidden_discs", age_ns)
+            if failure is not None:
+                found[name] = int(failure.parameters["count"])
         return found

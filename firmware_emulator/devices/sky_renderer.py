@@ -53,5 +53,5 @@ class SkyRenderer:
             sequence=exposure.sequence,
             is_sky_dead=exposure.is_sky_dead,
             false_lights=exposure.false_lights,
-            sky_faults=exposure.sky_faults,
+            sky_failures=exposure.sky_failures,
         )

@@ -26,7 +26,7 @@ from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.devices.table_renderer import TableRenderer
 from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
-from firmware_emulator.sky.sky import SkyFaults
+from firmware_emulator.sky.sky import SkyFailures
 from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
@@ -174,8 +174,8 @@ def _exposure(fields: dict[str, Any]) -> Exposure | TableExposure:
     """What the parent's dataclass became on the way."""
     if "paths" in fields:
         return TableExposure(**fields)
-    faults = fields.pop("sky_faults")
-    return Exposure(**fields, sky_faults=None if faults is None else SkyFaults(**faults))
+    failures = fields.pop("sky_failures")
+    return Exposure(**fields, sky_failures=None if failures is None else SkyFailures(**failures))
 
 
 if __name__ == "__main__":

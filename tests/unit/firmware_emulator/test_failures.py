@@ -1,4 +1,4 @@
-"""Contract of the fault table: every row acts, from its start and not before."""
+"""Contract of the failure table: every row acts, from its start and not before."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from drivers.valve_bus.protocol import Arm, ValveCommand, encode
-from firmware_emulator.faults import FAULT_KINDS, FaultConfig, Faults
+from firmware_emulator.failures import FAILURE_KINDS, FailureConfig, Failures
 from firmware_emulator.laboratory import EmulatedLaboratory
 
 MS = 1_000_000
@@ -26,7 +26,7 @@ STRONGER = {
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A small ceiling and a camera, so that camera faults have something to act on."""
+    """A small ceiling and a camera, so that camera failures have something to act on."""
     folder: Path = tmp_path_factory.mktemp("scene")
     rows = [f"{i},{0.31 * (i % 9) - 1.2},{0.27 * (i // 9) - 1.0}" for i in range(72)]
     (folder / "ceiling.csv").write_text("\n".join(["id,x_m,y_m", *rows]) + "\n")
@@ -40,7 +40,7 @@ def scene(tmp_path_factory):
     return folder
 
 
-def fly(scene, faults, source, *, has_overhead=False):
+def fly(scene, failures, source, *, has_overhead=False):
     camera = {"source": source, "rate_hz": 10.0, "delay_s": 0.05}
     if source == "rendered":
         camera |= {"ceiling": "ceiling.csv", "camera": "camera.json"}
@@ -51,7 +51,7 @@ def fly(scene, faults, source, *, has_overhead=False):
         "imu": {"ftdi_latency_ms": 1},
         "camera": camera,
     }
-    config = {"folder": str(scene), "vehicles": [vehicle], "faults": faults}
+    config = {"folder": str(scene), "vehicles": [vehicle], "failures": failures}
     if has_overhead:
         files = {"camera": FILES / "overhead_camera.json", "circles": FILES / "circles.toml"}
         config["overhead"] = {"rate_hz": 4.0, **{key: str(path) for key, path in files.items()}}
@@ -75,13 +75,13 @@ def said(arrivals, until_ns=None):
     ]
 
 
-@pytest.mark.parametrize("kind", FAULT_KINDS)
-def test_every_fault_of_the_table_acts_and_only_from_its_start(scene, kind):
-    source = "rendered" if FAULT_KINDS[kind].device in ("camera", "sky") else "fixes"
-    fault = {"kind": kind, "vehicle": "alpha", "start_s": START_S, "parameters": STRONGER.get(kind, {})}
-    has_overhead = FAULT_KINDS[kind].device == "overhead"
+@pytest.mark.parametrize("kind", FAILURE_KINDS)
+def test_every_failure_of_the_table_acts_and_only_from_its_start(scene, kind):
+    source = "rendered" if FAILURE_KINDS[kind].device in ("camera", "sky") else "fixes"
+    failure = {"kind": kind, "vehicle": "alpha", "start_s": START_S, "parameters": STRONGER.get(kind, {})}
+    has_overhead = FAILURE_KINDS[kind].device == "overhead"
     healthy, ill, again = (
-        fly(scene, faults, source, has_overhead=has_overhead) for faults in ([], [fault], [fault])
+        fly(scene, failures, source, has_overhead=has_overhead) for failures in ([], [failure], [failure])
     )
     start_ns = round(START_S * S)
     assert said(ill, start_ns) == said(healthy, start_ns)
@@ -89,41 +89,41 @@ def test_every_fault_of_the_table_acts_and_only_from_its_start(scene, kind):
     assert said(ill) == said(again)
 
 
-@pytest.mark.parametrize("kind", [k for k, row in FAULT_KINDS.items() if row.device == "camera"])
-def test_camera_faults_act_on_drawn_fixes_too(scene, kind):
-    fault = {"kind": kind, "vehicle": "alpha", "start_s": START_S}
-    assert said(fly(scene, [fault], "fixes")) != said(fly(scene, [], "fixes"))
+@pytest.mark.parametrize("kind", [k for k, row in FAILURE_KINDS.items() if row.device == "camera"])
+def test_camera_failures_act_on_drawn_fixes_too(scene, kind):
+    failure = {"kind": kind, "vehicle": "alpha", "start_s": START_S}
+    assert said(fly(scene, [failure], "fixes")) != said(fly(scene, [], "fixes"))
 
 
-@pytest.mark.parametrize("kind", FAULT_KINDS)
+@pytest.mark.parametrize("kind", FAILURE_KINDS)
 def test_every_parameter_may_be_given_and_no_other(kind):
-    row = FAULT_KINDS[kind]
-    FaultConfig(kind=kind, vehicle="alpha", parameters=dict(row.parameters))
+    row = FAILURE_KINDS[kind]
+    FailureConfig(kind=kind, vehicle="alpha", parameters=dict(row.parameters))
     with pytest.raises(ValidationError, match="has no parameter 'sorcery'"):
-        FaultConfig(kind=kind, vehicle="alpha", parameters={"sorcery": 1.0})
+        FailureConfig(kind=kind, vehicle="alpha", parameters={"sorcery": 1.0})
 
 
-def test_a_fault_of_an_unknown_vehicle_or_valve_is_refused():
+def test_a_failure_of_an_unknown_vehicle_or_valve_is_refused():
     with pytest.raises(ValidationError, match="names vehicle 'gamma'"):
         EmulatedLaboratory(
-            {"vehicles": [{"name": "alpha"}], "faults": [{"kind": "dead_sky", "vehicle": "gamma"}]}
+            {"vehicles": [{"name": "alpha"}], "failures": [{"kind": "dead_sky", "vehicle": "gamma"}]}
         )
     with pytest.raises(ValidationError, match=r"valve .* must lie in 0\.\.7"):
-        FaultConfig(kind="leaking_valve", vehicle="alpha", parameters={"valve": 8})
+        FailureConfig(kind="leaking_valve", vehicle="alpha", parameters={"valve": 8})
 
 
-def test_a_fault_that_ends_before_it_starts_is_refused():
+def test_a_failure_that_ends_before_it_starts_is_refused():
     with pytest.raises(ValidationError, match="ends"):
-        FaultConfig(kind="dead_sky", vehicle="alpha", start_s=5.0, end_s=4.0)
+        FailureConfig(kind="dead_sky", vehicle="alpha", start_s=5.0, end_s=4.0)
 
 
 def test_edges_are_those_of_the_device_asked_for():
     rows = [
-        FaultConfig(kind="dead_sky", vehicle="alpha", start_s=1.0, end_s=2.0),
-        FaultConfig(kind="leaking_valve", vehicle="alpha", start_s=3.0),
-        FaultConfig(kind="leaking_valve", vehicle="beta", start_s=4.0),
+        FailureConfig(kind="dead_sky", vehicle="alpha", start_s=1.0, end_s=2.0),
+        FailureConfig(kind="leaking_valve", vehicle="alpha", start_s=3.0),
+        FailureConfig(kind="leaking_valve", vehicle="beta", start_s=4.0),
     ]
-    faults = Faults.of_vehicle(rows, "alpha")
-    assert faults.edges_ns("valves") == [3 * S]
-    assert faults.edges_ns("camera") == [S, 2 * S]
-    assert faults.active("leaking_valve", 4 * S).parameters == {"valve": 0.0, "fraction": 0.1}
+    failures = Failures.of_vehicle(rows, "alpha")
+    assert failures.edges_ns("valves") == [3 * S]
+    assert failures.edges_ns("camera") == [S, 2 * S]
+    assert failures.active("leaking_valve", 4 * S).parameters == {"valve": 0.0, "fraction": 0.1}

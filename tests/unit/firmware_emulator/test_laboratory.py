@@ -249,7 +249,10 @@ def test_drawn_fixes_are_late_and_as_noisy_as_they_say():
         ({"vehicles": [{"name": "alpha"}], "tabel": {}}, "tabel"),
         ({"vehicles": [{"name": "alpha", "imu": {"averaging": 0}}]}, "vehicles.0.imu.averaging"),
         ({"vehicles": [{"name": "alpha", "mass_kg": -1.0}]}, "vehicles.0.mass_kg"),
-        ({"vehicles": [{"name": "alpha"}], "faults": [{"kind": "gremlin", "vehicle": "alpha"}]}, "faults.0"),
+        (
+            {"vehicles": [{"name": "alpha"}], "failures": [{"kind": "gremlin", "vehicle": "alpha"}]},
+            "failures.0",
+        ),
         ({"vehicles": [{"name": "alpha", "camera": {"source": "rendered"}}]}, "vehicles.0.camera"),
         (
             {

@@ -191,8 +191,8 @@ def test_the_process_announces_its_ports_and_leaves_none_behind(tmp_path, ending
         ("[laboratory", "is no TOML file"),
         ("[station]\nx = 1\n", "has no table [laboratory]"),
         ('[[laboratory.vehicles]]\nname = "alpha"\nmas_kg = 1\n', "laboratory.vehicles.0.mas_kg"),
-        ('[[laboratory.vehicles]]\nname = "alpha"\n[[laboratory.faults]]\nkind = "x"\nvehicle = "alpha"\n',
-         "no fault of kind 'x'"),
+        ('[[laboratory.vehicles]]\nname = "alpha"\n[[laboratory.failures]]\nkind = "x"\nvehicle = "alpha"\n',
+         "no failure of kind 'x'"),
         ('[[laboratory.vehicles]]\nname = "alpha"\ncamera = {source = "rendered", ceiling = "no.csv", '
          'camera = "no.json"}\n', "no.csv"),
     ],

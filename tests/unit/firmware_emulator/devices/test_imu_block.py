@@ -24,10 +24,10 @@ S = 1_000_000_000
 DONE, BAD_ARGUMENT = 0, 2
 
 
-def block(faults=(), **imu):
+def block(failures=(), **imu):
     vehicle = {"name": "alpha", "imu": {"ftdi_latency_ms": 1, **imu}, "camera": {"source": "none"}}
-    rows = [{"vehicle": "alpha", **fault} for fault in faults]
-    return EmulatedLaboratory({"vehicles": [vehicle], "faults": rows}, seed=4)
+    rows = [{"vehicle": "alpha", **failure} for failure in failures]
+    return EmulatedLaboratory({"vehicles": [vehicle], "failures": rows}, seed=4)
 
 
 def talk(laboratory, until_ns, commands=(), parser=None):
