@@ -52,12 +52,13 @@ class Arrival:
         stamp_ns: Host monotonic clock (virtual in lockstep) at which the last byte was there.
         channel: `<vehicle>/<device>` or a device all vehicles share: `alpha/imu`, `alpha/star_camera`,
             `alpha/reference`, `valve_bus`.
-        data: A chunk of bytes as one read would return it, one picture, or one CAN frame.
+        data: What the channel's kind says: a chunk of bytes as one read would return it, one picture, one CAN
+            frame.
     """
 
     stamp_ns: int
     channel: str
-    data: bytes | CameraFrame | CanFrame
+    data: object
 
 
 @runtime_checkable
@@ -82,7 +83,7 @@ class Laboratory(Protocol):
         """
         ...
 
-    def deliver(self, stamp_ns: int, channel: str, data: bytes | CanFrame) -> None:
+    def deliver(self, stamp_ns: int, channel: str, data: object) -> None:
         """Send something into a channel at `stamp_ns`, which is not before the last `advance`."""
         ...
 

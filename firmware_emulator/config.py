@@ -6,7 +6,7 @@ radians. Unknown keys are refused.
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AliasChoices, Field, model_validator
 
@@ -46,33 +46,8 @@ class TableConfig(Settings):
         return self
 
 
-class OverheadConfig(Settings):
-    """The camera over the table that looks down: one for the laboratory."""
-
-    camera: str
-    """Path of the camera file (JSON)."""
-    circles: str
-    """Path of what each mock-up wears (TOML)."""
-    rate_hz: Positive = 10.0
-    exposure_s: Positive = 0.01
-    delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.02
-    """From the middle of the exposure to the host."""
-    delay_jitter_s: NonNegative = 0.001
-    stream: Literal["raw", "mjpeg"] = "raw"
-    """How live pictures are served over HTTP."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
-
-    @model_validator(mode="after")
-    def _exposure_fits_the_rate(self) -> "OverheadConfig":
-        if self.exposure_s * self.rate_hz >= 1.0:
-            raise ValueError(
-                f"exposure_s = {self.exposure_s:g} s is longer than a period of rate_hz = {self.rate_hz:g}"
-            )
-        return self
-
-
 class LaboratoryConfig(Settings):
-    """The whole `[laboratory]` table."""
+    """The `[laboratory]` table, beside the sections of devices (`device_table.read_config`)."""
 
     name: str = "emulator"
     """The entry point that made this laboratory."""
@@ -81,8 +56,6 @@ class LaboratoryConfig(Settings):
     seed: Annotated[int, Field(ge=0)] = 0
     table: TableConfig = TableConfig()
     vehicles: Annotated[tuple[VehicleConfig, ...], Field(min_length=1, max_length=MAX_VEHICLES)]
-    overhead: OverheadConfig | None = None
-    """The camera over the table, if there is one."""
     failures: Annotated[
         tuple[FailureConfig, ...], Field(validation_alias=AliasChoices("failures", "faults"))
     ] = ()

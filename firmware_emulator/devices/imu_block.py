@@ -112,6 +112,10 @@ class ImuBlock:
         period_ns = int(min(self._window, self._averaging) * self._grid.period_ns)
         return self.line.next_arrival_ns(first_send_ns, wire_bytes, period_ns)
 
+    def take(self, until_ns: int) -> list[tuple[int, bytes]]:
+        """Chunks of bytes that reached the host up to `until_ns`."""
+        return self.line.take(until_ns)
+
     def receive(self, stamp_ns: int, data: bytes) -> None:
         """Bytes that the host writes at `stamp_ns`; they take their time on the line."""
         arrives_ns = stamp_ns + round(len(data) * self.line.byte_ns)

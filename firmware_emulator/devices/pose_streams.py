@@ -10,12 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.laboratory import ChannelKind
 from drivers.reference.protocol import ReferencePose, encode
+from firmware_emulator.device_kind import DeviceKind
+from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.failures import Failures
+from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
+from firmware_emulator.scenario import MockUp
 
 _SEQUENCE_MODULUS = 1 << 16
 _TRUE_UNCERTAINTY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -199,3 +204,53 @@ class FixStream:
 _GROSS_SHARE = 0.5
 _SUBTLE_M = (0.03, 0.12)
 _SUBTLE_RAD = 0.05
+
+
+def build_truth(mock_up: MockUp, config: VehicleConfig) -> TruthStream | None:
+    """The truth about a mock-up, if its table asks for it."""
+    if config.reference_rate_hz == 0.0:
+        return None
+    return TruthStream(
+        mock_up.index, mock_up.vehicle, config.reference_rate_hz, config.reference_delay_s, mock_up.start_ns
+    )
+
+
+def build_fixes(mock_up: MockUp, settings: CameraConfig) -> FixStream | None:
+    """The drawn fixes of a mock-up, if they stand in for its camera."""
+    if settings.source != "fixes":
+        return None
+    errors = FixErrors(
+        settings.sigma_xy_m,
+        settings.sigma_heading_rad,
+        settings.missing_fraction,
+        settings.wrong_fraction,
+        mock_up.scenario.config.table.bounds_m,
+    )
+    return FixStream(
+        mock_up.index,
+        mock_up.vehicle,
+        settings.rate_hz,
+        settings.delay_s,
+        settings.delay_jitter_s,
+        errors,
+        mock_up.failures,
+        mock_up.random("camera"),
+        mock_up.start_ns,
+    )
+
+
+REFERENCE = DeviceKind(
+    name="reference",
+    channel=ChannelKind.BYTES,
+    per_vehicle=build_truth,
+    served_by="firmware_emulator.live.served:TcpServed",
+)
+FIXES = DeviceKind(
+    name="fixes",
+    channel=ChannelKind.BYTES,
+    per_vehicle=build_fixes,
+    section="camera",
+    settings=CameraConfig,
+    is_standard=True,
+    served_by="firmware_emulator.live.served:TcpServed",
+)

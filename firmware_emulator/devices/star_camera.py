@@ -1,21 +1,23 @@
 """The webcam that looks up: when it exposes, where the vehicle is meanwhile, when the picture arrives.
 
-What the picture shows is the business of `firmware_emulator.sky`, behind `Renderer`; so pictures may be
+What the picture shows is the business of `firmware_emulator.sky`, behind a `Renderer`; so pictures may be
 drawn at once (lockstep) or by another process (live).
 """
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.laboratory import ChannelKind
+from firmware_emulator.device_kind import DeviceKind, PictureOrder
+from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.failures import Failures
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
+from firmware_emulator.scenario import MockUp, Scenario
 from firmware_emulator.sky.sky import SkyFailures
 
 Pose = tuple[float, float, float]
@@ -46,14 +48,6 @@ class Exposure:
     is_sky_dead: bool
     false_lights: int
     sky_failures: SkyFailures | None = None
-
-
-class Renderer(Protocol):
-    """Draws what the camera sees."""
-
-    def render(self, exposure: Exposure) -> NDArray[np.uint8]:
-        """The picture, shape (height, width)."""
-        ...
 
 
 class StarCamera:
@@ -169,3 +163,52 @@ class StarCamera:
 
 def _pose(motion: Motion) -> Pose:
     return motion.x_m, motion.y_m, motion.heading_rad
+
+
+def build(mock_up: MockUp, settings: CameraConfig) -> StarCamera | None:
+    """The camera of a mock-up, if it takes pictures."""
+    if settings.source != "rendered":
+        return None
+    return StarCamera(
+        mock_up.vehicle,
+        settings.rate_hz,
+        settings.exposure_s,
+        settings.readout_s,
+        settings.delay_s,
+        settings.delay_jitter_s,
+        mock_up.failures,
+        mock_up.random("camera"),
+        mock_up.start_ns,
+    )
+
+
+def order(scenario: Scenario, index: int, settings: CameraConfig) -> PictureOrder | None:
+    """Who draws the pictures of vehicle `index`: all cameras look at one sky, each with noise of its own."""
+    if settings.source != "rendered":
+        return None
+    vehicle = scenario.config.vehicles[index]
+    return PictureOrder(
+        name=vehicle.name,
+        renderer="firmware_emulator.devices.sky_renderer:SkyRenderer",
+        arguments={
+            "ceiling": scenario.config.path(settings.ceiling),
+            "camera": scenario.config.path(settings.camera),
+            "exposure_s": settings.exposure_s,
+            "readout_s": settings.readout_s,
+            "sky_seed": scenario.seed_words,
+            "camera_seed": [*scenario.seed_words, 1 + index, vehicle.seed_offset],
+        },
+        stream=settings.stream,
+        jpeg_quality=settings.jpeg_quality,
+    )
+
+
+STAR_CAMERA = DeviceKind(
+    name="star_camera",
+    channel=ChannelKind.CAMERA,
+    per_vehicle=build,
+    section="camera",
+    settings=CameraConfig,
+    is_standard=True,
+    pictures=order,
+)

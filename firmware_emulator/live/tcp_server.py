@@ -68,6 +68,11 @@ class TcpServer:
         selector.register(self._listener, selectors.EVENT_READ, self._accept)
 
     @property
+    def dropped_messages(self) -> int:
+        """Messages that present clients missed because they did not read."""
+        return sum(client.dropped_messages for client in self.clients)
+
+    @property
     def url(self) -> str:
         """How pyserial names this port."""
         return f"socket://{LOOPBACK}:{self.port}"
