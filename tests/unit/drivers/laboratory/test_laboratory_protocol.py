@@ -2,7 +2,6 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from drivers import laboratory
 from drivers.errors import NotFound
 from drivers.laboratory import (
     Arrival,
@@ -12,6 +11,7 @@ from drivers.laboratory import (
     load_laboratory,
     parse_announcement,
 )
+from drivers.laboratory import channels as laboratory
 
 ADDRESSES = {
     "alpha/imu": "/dev/pts/3",
