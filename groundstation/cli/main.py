@@ -28,6 +28,7 @@ COMMANDS = {
     "request": Command(
         "groundstation.cli.request:app", "Ask something of a running vehicle: arm, stop, go_to."
     ),
+    "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames; surveys."),
