@@ -94,6 +94,12 @@ class Codec(Generic[M]):
 
 
 @functools.cache
+def _compiled(cls: Any) -> Any:  # noqa: ANN401 - a class is hashable, which mypy doubts
+    return Codec(cls)
+
+
 def codec_of(cls: type[M]) -> Codec[M]:
     """The codec of a class, compiled at the first call."""
-    return Codec(cls)
+    kind: Any = cls
+    found: Codec[M] = _compiled(kind)
+    return found

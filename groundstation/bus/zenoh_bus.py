@@ -80,7 +80,7 @@ class TopicPublisher:
         )
         self.is_wanted = always
         self._listener = None if always else self._publisher.declare_matching_listener(self._match)
-        if self._listener is not None and self._publisher.matching_status.matching:
+        if self._listener is not None and self._publisher.matching_status:
             self.is_wanted = True
 
     def _match(self, status: zenoh.MatchingStatus) -> None:

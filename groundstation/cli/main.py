@@ -28,6 +28,7 @@ COMMANDS = {
     "request": Command(
         "groundstation.cli.request:app", "Ask something of a running vehicle: arm, stop, go_to."
     ),
+    "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames; surveys."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
@@ -78,9 +79,9 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
+    from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import CalibrationFileError
     from groundstation.recording.errors import RecordingError
-    from groundstation.runtime.errors import GroundStationError, UsageError
 
     try:
         build(words[0] if words else None)(words, prog_name="groundstation")

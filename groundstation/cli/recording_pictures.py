@@ -26,7 +26,7 @@ class ExplainedPicture:
 
     Attributes:
         vehicle: Whose camera.
-        stamp_ns: Middle of the exposure.
+        stamp_ns: Arrival of the picture.
         image: Grey, uint8 (h, w), as the camera gave it.
         notes: Which light is what.
         reason: Why there was no fix; empty for a fix.
@@ -46,7 +46,7 @@ def explained_pictures(recording: Recording) -> Iterator[ExplainedPicture]:
         RecordingError: The file cannot be read.
     """
     halves: dict[tuple[str, int], StarMatches | StarPicture] = {}
-    for message in recording.messages({StarMatches.TOPIC, StarPicture.TOPIC}):
+    for message in recording.messages([StarMatches, StarPicture]):
         payload = message.payload
         key = (payload.vehicle, payload.stamp_ns)
         assert isinstance(payload, StarMatches | StarPicture)

@@ -1,9 +1,12 @@
-"""What ``groundstation run`` shows on a terminal: mock-ups, ages, processes, ports, tidings."""
+"""What ``groundstation run`` shows on a terminal: mock-ups, ages, processes, ports, events."""
+
+from __future__ import annotations
 
 import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console, Group
@@ -12,13 +15,23 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from groundstation.cli.vehicle_rows import LABELS, line_of, rows_of
-from groundstation.messages import definitions as m
-from groundstation.runtime.live_run import LiveRun
+from groundstation.declarations.view import Cell, Level
+from groundstation.watch.ledger import STAGES
+
+if TYPE_CHECKING:  # it brings the bus along
+    from groundstation.launch.live_run import LiveRun
 
 _GOOD, _BAD, _DIM, _WARN = "green", "red", "bright_black", "yellow"
+_STYLES = {
+    Level.PLAIN: "",
+    Level.GOOD: _GOOD,
+    Level.WARNING: _WARN,
+    Level.BAD: _BAD,
+    Level.FAINT: _DIM,
+}
 _STAGES = {
-    "arrival": "frame read",
+    "exposure": "exposure",
+    "arrival": "picture arrived",
     "spots": "spots found",
     "fix": "fix published",
     "state": "in the state",
@@ -62,18 +75,18 @@ class TerminalView:
         waited_for = f"starting: waiting for {', '.join(waiting)}" if waiting else "all processes are ready"
         if waited_for != self._waited_for:
             self._waited_for = waited_for
-            self._run.monitor.say(waited_for)
+            self._run.monitor.note(waited_for)
         for line in self._run.monitor.take_lines():
             print(f"{self._elapsed_s():7.1f} s  {line}", flush=True)
 
     def print_vehicles(self) -> None:
-        """One line per vehicle that was heard of."""
+        """One line per vehicle of which anything was received."""
         vehicles = self._run.monitor.vehicles
         width = max(map(len, vehicles))
         now_ns = time.monotonic_ns()
         for name, vehicle in vehicles.items():
-            if vehicle.newest:
-                print(f"{self._elapsed_s():7.1f} s  {name:<{width}} {line_of(vehicle, now_ns)}", flush=True)
+            if vehicle.is_known:
+                print(f"{self._elapsed_s():7.1f} s  {name:<{width}} {vehicle.line(now_ns)}", flush=True)
 
     def _elapsed_s(self) -> float:
         return time.monotonic() - self._run.started_s
@@ -95,12 +108,12 @@ class TerminalView:
         lower.add_column()
         lower.add_column(ratio=1)
         lower.add_row(self._ages(), self._processes(), self._ports())
-        tidings = Text("\n".join(run.monitor.lines) or "starting ...", no_wrap=True, overflow="ellipsis")
+        events = Text("\n".join(run.monitor.lines) or "starting ...", no_wrap=True, overflow="ellipsis")
         return Group(
             title,
             *self._vehicles(),
             lower,
-            Panel(tidings, title="tidings", title_align="left", border_style=_DIM, padding=(0, 1)),
+            Panel(events, title="events", title_align="left", border_style=_DIM, padding=(0, 1)),
         )
 
     def _vehicles(self) -> Iterator[Table]:
@@ -112,20 +125,21 @@ class TerminalView:
             table.add_column("", style=_DIM, no_wrap=True, width=24)
             for name, _ in shown:
                 table.add_column(Text(name, style="bold"), no_wrap=True, ratio=1)
-            columns = [rows_of(vehicle, now_ns) for _, vehicle in shown]
-            for label, *cells in zip(LABELS, *columns, strict=True):
-                table.add_row(label, *cells)
+            labels = shown[0][1].labels()
+            columns = [vehicle.rows(now_ns) for _, vehicle in shown]
+            for label, *cells in zip(labels, *columns, strict=True):
+                table.add_row(label, *map(text_of, cells))
             yield table
 
     def _ages(self) -> Table:
         table = _small("age of the light, p50 / p99 ms")
         table.add_column("", style=_DIM, no_wrap=True)
-        rows = {name: vehicle.newest.get(m.Latency) for name, vehicle in self._run.monitor.vehicles.items()}
-        known = {name: row for name, row in list(rows.items())[:_MOST_COLUMNS] if isinstance(row, m.Latency)}
+        known = dict(list(self._run.monitor.latency.items())[:_MOST_COLUMNS])
         for name in known:
             table.add_column(name, justify="right", no_wrap=True)
-        for index, label in enumerate(_STAGES.values()):
-            table.add_row(label, *(_ms(row.p50_s[index], row.p99_s[index]) for row in known.values()))
+        for index, stage in enumerate(STAGES):
+            ages = (_ms(row.p50_s[index], row.p99_s[index]) for row in known.values())
+            table.add_row(_STAGES[stage], *ages)
         return table
 
     def _processes(self) -> Table:
@@ -141,12 +155,18 @@ class TerminalView:
         table = _small("ports")
         table.add_column("", no_wrap=True)
         table.add_column("", no_wrap=True, overflow="ellipsis")
-        for name, said in sorted(self._run.monitor.ports.items()):
-            if said.level == 0:
+        for name, report in sorted(self._run.monitor.health.ports.items()):
+            if report.level == 0:
                 table.add_row(name, Text("open", style=_GOOD))
             else:
-                table.add_row(name, Text(said.summary.removeprefix(f"{name}: "), style=_BAD))
+                table.add_row(name, Text(report.summary.removeprefix(f"{name}: "), style=_BAD))
         return table
+
+
+def text_of(cell: Cell) -> Text:
+    """A cell in the colours of its levels; what does not fit is cut off."""
+    pieces = [(piece, _STYLES[level]) for piece, level in cell.pieces]
+    return Text.assemble(*pieces, no_wrap=True, overflow="ellipsis")
 
 
 def _small(title: str) -> Table:

@@ -93,11 +93,13 @@ class PortRow:
 
     Attributes:
         node: Name of that node.
+        kind: Its class.
         make: The port of a vehicle, or of the rig (vehicle empty) for a node of the rig or ``is_of_rig``;
             None where the rig names none.
         is_of_rig: One port for all vehicles.
     """
 
     node: str
+    kind: type[Port]
     make: Callable[[Rig, str], Port | None]
     is_of_rig: bool = False

@@ -1,4 +1,7 @@
-"""The table of parts: those of the tree, then those of installed packages (entry points ``groundstation.parts``)."""
+"""The table of parts: those of the tree, then those of installed packages.
+
+A package adds its own by an entry point of the group ``groundstation.parts``.
+"""
 
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points

@@ -39,10 +39,8 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
             raise RecordingError(f"{where} was recorded without the field '{name}'")
         if types[name] != ros_type:
             raise RecordingError(f"{where} was recorded with {name} as {types[name]}, expected {ros_type}")
-    made = make_dataclass(
-        kind.__name__, [(name, Annotated[Any, ros_type]) for name, ros_type in old], bases=(Message,), eq=False,
-        frozen=True,
-    )  # fmt: skip
+    columns = [(name, Annotated[Any, ros_type]) for name, ros_type in old]
+    made = make_dataclass(kind.__name__, columns, bases=(Message,), eq=False, frozen=True)
     codec: Codec[Any] = Codec(made)
     wanted = [field.name for field in fields(kind)]
 

@@ -1,4 +1,4 @@
-"""Sends a process's record stream from a thread of its own: a slow hub or recorder never delays the flight."""
+"""Sends a process's record stream from a thread of its own: a slow recorder never delays the flight."""
 
 import queue
 import threading

@@ -1,4 +1,4 @@
-"""A node in a runner: what it consumes and publishes is counted, journaled and timed, the same in all runners."""
+"""A node in a runner: all it consumes and publishes is counted, journaled and timed, in every runner alike."""
 
 import time
 from collections.abc import Iterable

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from groundstation.runtime.tracks import Track, estimate_errors, station_errors
+from groundstation.parts.control.gauges import station_errors
+from groundstation.parts.reference.gauges import estimate_errors
+from groundstation.watch.tracks import Track
 
 VALVES = 8
 DPI = 120
@@ -45,7 +47,8 @@ def draw_errors(tracks: Mapping[str, Track], path: Path) -> None:
     figure = Figure(figsize=(10, 3 * 4), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
     for colour, (name, track) in zip(_cycle(), tracks.items(), strict=False):
-        station, estimate = station_errors(track), estimate_errors(track)
+        station = station_errors(track.truth, track.goal, track.flying_since_s)
+        estimate = estimate_errors(track.state, track.truth)
         panels[0].plot(station[:, 0], station[:, 1] * 1e3, color=colour, lw=0.8, label=name)
         panels[1].plot(station[:, 0], np.degrees(station[:, 2]), color=colour, lw=0.8)
         flown = estimate[estimate[:, 0] >= np.nan_to_num(track.flying_since_s)]
@@ -75,7 +78,7 @@ def draw_errors(tracks: Mapping[str, Track], path: Path) -> None:
 
 
 def draw_valves(tracks: Mapping[str, Track], path: Path) -> None:
-    """When each valve was open, by the guard's word."""
+    """When each valve was open, as the guard let it."""
     figure = Figure(figsize=(10, 2.2 * max(1, len(tracks)) + 0.6), layout="constrained")
     panels = np.atleast_1d(figure.subplots(len(tracks), 1, sharex=True))
     for axes, colour, (name, track) in zip(panels, _cycle(), tracks.items(), strict=False):
@@ -100,9 +103,10 @@ def draw_fixes(tracks: Mapping[str, Track], path: Path) -> None:
     scales = (1e3, 1e3, 180.0 / math.pi, 1.0)
     largest = np.full(4, 1e-3)
     for track in tracks.values():
-        used = track.accounts[track.accounts[:, 1] == 1.0, 2:]
-        if np.isfinite(used).any():
-            largest = np.fmax(largest, 1.3 * np.nanmax(np.abs(used), axis=0) * scales)
+        used = np.abs(track.accounts[track.accounts[:, 1] == 1.0, 2:])
+        # an estimator without NIS leaves a column without a number
+        seen = np.max(used, axis=0, initial=0.0, where=np.isfinite(used))
+        largest = np.maximum(largest, 1.3 * seen * scales)
     for colour, (name, track) in zip(_cycle(), tracks.items(), strict=False):
         t, is_used = track.accounts[:, 0], track.accounts[:, 1] == 1.0
         unused = Counter(
@@ -133,7 +137,7 @@ def draw_fixes(tracks: Mapping[str, Track], path: Path) -> None:
 
 
 def draw_latency(tracks: Mapping[str, Track], path: Path) -> None:
-    """Age of the light at each stage of the chain, and of the bytes at the state."""
+    """Age of the light at each stage of the chain from the exposure on, and of the bytes at the state."""
     figure = Figure(figsize=(10, 3.5), layout="constrained")
     axes = figure.add_subplot()
     names = [name for name, track in tracks.items() if track.latency is not None]

@@ -1,160 +1,216 @@
-"""The latency ledger: how old the light and the inertia are at every stage, from envelopes alone.
+"""The latency ledger: how old the light and the inertia are at every stage, from envelopes and causes.
 
-Two chains per vehicle. *Light*: exposure's middle, arrival of the frame, spots, fix, first state that
-holds the fix, first wrench from such a state, valve command, CAN frame. *Inertia*: bytes arrived, state
-published. Every valve command names its causes; ``causes_of`` walks them back.
+Two chains per vehicle. *Light*: middle of the exposure (as the star tracker concluded it), arrival of
+the picture, spots, fix, first state that holds the fix, first wrench from such a state, past the guard,
+CAN frame. *Inertia*: bytes arrived, state published.
+
+The first cause of a message is what triggered it, so the origin of a message (an exposure, an arrival of
+bytes) is that of its first cause. Record streams of several processes come one before the other: a message
+whose first cause is not here yet waits for it.
 """
 
-from collections import OrderedDict, defaultdict, deque
-from collections.abc import Iterator
+import math
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from itertools import islice
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from groundstation.bus.envelope import Cause, Delivered, Envelope
-from groundstation.bus.topics import TOPICS, topic_of
-from groundstation.messages import definitions as m
-from groundstation.messages.base import Message
+from groundstation.bus.cdr import CodecError, codec_of
+from groundstation.bus.envelope import Cause, Delivered
+from groundstation.bus.record_stream import Recorded
+from groundstation.declarations.message import Message
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.imu.messages import Imu, ImuBytes
+from groundstation.parts.operation.messages import Latency
+from groundstation.parts.stars.messages import StarFix, StarSpots
+from groundstation.parts.valves.messages import CanOut, ValveCommand, ValveDemand, ValveSelection
 
 K = TypeVar("K")
 V = TypeVar("V")
 
-STAGES = ("arrival", "spots", "fix", "state", "wrench", "guard", "bus", "bytes_to_state")
-"""Ages since the exposure's middle, but the last: from bytes arrived to state published."""
+LIGHT = ("exposure", "arrival", "spots", "fix", "state", "wrench", "guard", "bus")
+"""Ages since the middle of the exposure, in the order of the chain."""
+BYTES_TO_STATE = "bytes_to_state"
+"""From the arrival of the bytes to the state."""
+STAGES = (*LIGHT, BYTES_TO_STATE)
 
-_KEPT = 4096
-_WINDOW = 2000
-_STATE = topic_of(m.VehicleState).index
-_IMU = topic_of(m.Imu).index
-_IMU_BYTES = topic_of(m.ImuBytes).index
-HEARD: frozenset[type[Message]] = frozenset(
-    {
-        m.ImuBytes,
-        m.Imu,
-        m.StarSpots,
-        m.StarFix,
-        m.VehicleState,
-        m.Wrench,
-        m.ValveDemand,
-        m.ValveSelection,
-        m.ValveCommand,
-        m.CanOut,
-    }
-)
+_BY_STARS = frozenset(LIGHT[: LIGHT.index("state")])
+_STAGE_OF = {Wrench.TOPIC.noun: "wrench", ValveCommand.TOPIC.noun: "guard", CanOut.TOPIC.noun: "bus"}
+_READ: Mapping[str, type[Message]] = {
+    kind.TOPIC.noun: kind for kind in (ImuBytes, StarSpots, StarFix, VehicleState)
+}
+_PASSED_ON: Mapping[str, type[Message]] = {
+    kind.TOPIC.noun: kind for kind in (Imu, Wrench, ValveDemand, ValveSelection, ValveCommand, CanOut)
+}
+FOLLOWED: Mapping[str, type[Message]] = {**_READ, **_PASSED_ON}
+"""Classes that the ledger wants, by their nouns; it passes over all others."""
+
+_SPOTS, _IMU, _STATE = StarSpots.TOPIC.noun, Imu.TOPIC.noun, VehicleState.TOPIC.noun
+_SAMPLES = 2000
+_ORIGINS = 16384
+_WAITING = 4096
+
+
+class _Link(NamedTuple):
+    """A message on one of the chains."""
+
+    key: Cause
+    publish_ns: int
+    stamp_ns: int = 0
+
+
+def _samples() -> deque[float]:
+    return deque(maxlen=_SAMPLES)
 
 
 @dataclass(slots=True)
 class _Vehicle:
-    envelopes: OrderedDict[Cause, Envelope] = field(default_factory=OrderedDict)
-    stamps: OrderedDict[Cause, int] = field(default_factory=OrderedDict)
-    exposure_of_state: OrderedDict[int, int] = field(default_factory=OrderedDict)
-    reached: dict[str, int] = field(default_factory=dict)  # stage -> newest exposure that got there
-    ages_s: dict[str, deque[float]] = field(
-        default_factory=lambda: {stage: deque(maxlen=_WINDOW) for stage in STAGES}
-    )
+    """When light of each exposure first reached each stage, and ages of the bytes at the state (s)."""
+
+    first_ns: dict[str, dict[int, int]] = field(default_factory=lambda: {stage: {} for stage in LIGHT})
+    bytes_to_state_s: deque[float] = field(default_factory=_samples)
+
+    def reach(self, stage: str, exposure_ns: int, at_ns: int) -> None:
+        """Light of an exposure reached a stage; the first time counts, in whatever order it is reported."""
+        first_ns = self.first_ns[stage]
+        known_ns = first_ns.get(exposure_ns)
+        if known_ns is None:
+            _keep(first_ns, exposure_ns, at_ns, _SAMPLES)
+        elif at_ns < known_ns:
+            first_ns[exposure_ns] = at_ns
+
+    def ages_s(self, stage: str) -> list[float]:
+        """Ages at a stage; where the star tracker makes fixes, only its exposures count."""
+        if stage == BYTES_TO_STATE:
+            return list(self.bytes_to_state_s)
+        ages_ns, of_stars = self.first_ns[stage], self.first_ns["fix"]
+        return [
+            (at_ns - exposure_ns) * 1e-9
+            for exposure_ns, at_ns in ages_ns.items()
+            if stage in _BY_STARS or not of_stars or exposure_ns in of_stars
+        ]
 
 
 class Ledger:
-    """Follows the messages of all vehicles; give it every message of ``HEARD`` in any order."""
+    """Follows the messages of all vehicles, in any order; messages that are on no chain are passed over."""
 
     def __init__(self) -> None:
-        self._vehicles: defaultdict[str, _Vehicle] = defaultdict(_Vehicle)
+        self._vehicles: dict[str, _Vehicle] = {}
+        self._origins_ns: dict[Cause, int] = {}
+        self._waiting: dict[Cause, list[_Link]] = {}
 
-    def take(self, delivered: Delivered) -> None:
-        """Account for one message."""
+    def take(self, recorded: Recorded, payload: Message | None = None) -> None:
+        """Account for a message of the record stream.
+
+        Args:
+            recorded: The message.
+            payload: Its payload, where it has been decoded anyway.
+        """
+        noun = recorded.noun
+        if noun in _PASSED_ON:
+            self._pass_on(
+                Cause(noun, recorded.owner, recorded.sequence), recorded.publish_ns, recorded.causes
+            )
+        elif noun in _READ:
+            if payload is None:
+                try:
+                    payload = codec_of(_READ[noun]).decode(recorded.data)
+                except CodecError:
+                    return  # whoever shows messages counts these
+            key = Cause(noun, recorded.owner, recorded.sequence)
+            self._read(key, recorded.publish_ns, recorded.causes, payload)
+
+    def take_delivered(self, delivered: Delivered) -> None:
+        """Account for a message that was never encoded, in lockstep."""
         envelope, payload = delivered
-        vehicle = self._vehicles[payload.vehicle]
-        key = Cause(envelope.topic.index, envelope.sequence)
-        _keep(vehicle.envelopes, key, envelope)
-        match payload:
-            case m.ImuBytes():
-                _keep(vehicle.stamps, key, payload.stamp_ns)
-            case m.StarSpots():
-                self._reach(vehicle, "arrival", payload.stamp_ns, payload.arrival_ns)
-                self._reach(vehicle, "spots", payload.stamp_ns, envelope.publish_ns)
-            case m.StarFix(fix=True):
-                self._reach(vehicle, "fix", payload.stamp_ns, envelope.publish_ns)
-            case m.VehicleState():
-                _keep(vehicle.exposure_of_state, envelope.sequence, payload.fix_stamp_ns)
-                self._reach(vehicle, "state", payload.fix_stamp_ns, envelope.publish_ns)
-                self._inertia(vehicle, envelope)
-            case m.Wrench():
-                self._downstream(vehicle, "wrench", envelope)
-            case m.ValveCommand():
-                self._downstream(vehicle, "guard", envelope)
-            case m.CanOut():
-                self._downstream(vehicle, "bus", envelope)
+        noun = envelope.topic.noun
+        if noun in FOLLOWED:
+            key = Cause(noun, envelope.owner, envelope.sequence)
+            if noun in _PASSED_ON:
+                self._pass_on(key, envelope.publish_ns, envelope.causes)
+            else:
+                self._read(key, envelope.publish_ns, envelope.causes, payload)
 
-    def causes_of(self, vehicle: str, cause: Cause) -> Iterator[Envelope]:
-        """Envelopes of a message and of all it was made from, newest first, as far as still kept."""
-        kept = self._vehicles[vehicle].envelopes
-        waiting, seen = [cause], {cause}
-        while waiting:
-            envelope = kept.get(waiting.pop(0))
-            if envelope is None:
-                continue
-            yield envelope
-            fresh = [c for c in envelope.causes if c not in seen]
-            seen.update(fresh)
-            waiting.extend(fresh)
-
-    def vehicles(self) -> tuple[str, ...]:
-        """Vehicles heard of."""
-        return tuple(self._vehicles)
-
-    def summary(self, vehicle: str, stamp_ns: int) -> m.Latency:
-        """Ages of the last ``_WINDOW`` samples per stage, as the bus reports them; NaN where none."""
-        ages = self._vehicles[vehicle].ages_s
-        p50, p99 = [], []
+    def summary(self, vehicle: str, stamp_ns: int) -> Latency:
+        """Percentiles of the ages at each stage over the last samples; NaN where there are none."""
+        known = self._vehicles.get(vehicle)
+        p50_s, p99_s = [], []
         for stage in STAGES:
-            values = np.fromiter(ages[stage], float)
-            low, high = np.percentile(values, (50, 99)) if values.size else (np.nan, np.nan)
-            p50.append(float(low))
-            p99.append(float(high))
-        return m.Latency(stamp_ns, vehicle, STAGES, tuple(p50), tuple(p99))
+            ages_s = known.ages_s(stage) if known is not None else []
+            low, high = np.percentile(ages_s, (50, 99)).tolist() if ages_s else (math.nan, math.nan)
+            p50_s.append(low)
+            p99_s.append(high)
+        return Latency(stamp_ns, vehicle, STAGES, tuple(p50_s), tuple(p99_s))
 
-    @staticmethod
-    def _reach(vehicle: _Vehicle, stage: str, exposure_ns: int, publish_ns: int) -> None:
-        """Count the first time that light of this exposure reaches a stage."""
-        if exposure_ns > vehicle.reached.get(stage, 0):
-            vehicle.reached[stage] = exposure_ns
-            vehicle.ages_s[stage].append((publish_ns - exposure_ns) * 1e-9)
+    def _read(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...], payload: Message) -> None:
+        """A message that says something of an origin."""
+        if isinstance(payload, ImuBytes):
+            self._learn(key, payload.stamp_ns)
+        elif isinstance(payload, StarSpots):  # its fix will name the exposure
+            self._await(key, _Link(key, publish_ns, payload.stamp_ns))
+        elif isinstance(payload, StarFix):
+            vehicle = self._vehicle(key.owner)
+            vehicle.reach("exposure", payload.stamp_ns, payload.stamp_ns)
+            if payload.fix:
+                vehicle.reach("fix", payload.stamp_ns, publish_ns)
+            if causes and causes[0].noun == _SPOTS:
+                self._learn(causes[0], payload.stamp_ns)
+        elif isinstance(payload, VehicleState):
+            if payload.fix_stamp_ns:
+                self._vehicle(key.owner).reach("state", payload.fix_stamp_ns, publish_ns)
+            self._learn(key, payload.fix_stamp_ns)
+            if causes and causes[0].noun == _IMU:
+                self._await(causes[0], _Link(key, publish_ns))
 
-    def _inertia(self, vehicle: _Vehicle, envelope: Envelope) -> None:
-        imu = next((c for c in envelope.causes if c.topic_index == _IMU), None)
-        made = vehicle.envelopes.get(imu) if imu is not None else None
-        if made is None:
+    def _pass_on(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...]) -> None:
+        """A message whose origin is that of what triggered it."""
+        if causes and causes[0].noun in FOLLOWED:
+            self._await(causes[0], _Link(key, publish_ns))
+
+    def _await(self, cause: Cause, link: _Link) -> None:
+        origin_ns = self._origins_ns.get(cause)
+        if origin_ns is not None:
+            self._follow(link, origin_ns)
             return
-        read = next((c for c in made.causes if c.topic_index == _IMU_BYTES), None)
-        arrived_ns = vehicle.stamps.get(read) if read is not None else None
-        if arrived_ns is not None:
-            vehicle.ages_s["bytes_to_state"].append((envelope.publish_ns - arrived_ns) * 1e-9)
+        links = self._waiting.get(cause)
+        if links is None:
+            _keep(self._waiting, cause, [link], _WAITING)
+        else:
+            links.append(link)
 
-    def _downstream(self, vehicle: _Vehicle, stage: str, envelope: Envelope) -> None:
-        """Find the state that a command came from, and the light in it."""
-        key = Cause(envelope.topic.index, envelope.sequence)
-        for ancestor in self._walk(vehicle, key):
-            if ancestor.topic.index == _STATE:
-                exposure_ns = vehicle.exposure_of_state.get(ancestor.sequence, 0)
-                self._reach(vehicle, stage, exposure_ns, envelope.publish_ns)
-                return
+    def _learn(self, key: Cause, origin_ns: int) -> None:
+        """The origin of a message is known (0: there is none yet), so is that of all that waited for it."""
+        _keep(self._origins_ns, key, origin_ns, _ORIGINS)
+        for link in self._waiting.pop(key, ()):
+            self._follow(link, origin_ns)
 
-    @staticmethod
-    def _walk(vehicle: _Vehicle, cause: Cause) -> Iterator[Envelope]:
-        """The chain of triggers, i.e. first causes, from a message back."""
-        for _ in range(len(TOPICS)):
-            envelope = vehicle.envelopes.get(cause)
-            if envelope is None:
-                return
-            yield envelope
-            demand = [c for c in envelope.causes if c.topic_index < cause.topic_index]
-            if not demand:
-                return
-            cause = max(demand)
+    def _follow(self, link: _Link, origin_ns: int) -> None:
+        noun, vehicle = link.key.noun, self._vehicle(link.key.owner)
+        if noun == _SPOTS:
+            vehicle.reach("arrival", origin_ns, link.stamp_ns)
+            vehicle.reach("spots", origin_ns, link.publish_ns)
+        elif noun == _STATE:
+            vehicle.bytes_to_state_s.append((link.publish_ns - origin_ns) * 1e-9)
+        else:
+            stage = _STAGE_OF.get(noun)
+            if stage is not None and origin_ns:
+                vehicle.reach(stage, origin_ns, link.publish_ns)
+            self._learn(link.key, origin_ns)
+
+    def _vehicle(self, name: str) -> _Vehicle:
+        found = self._vehicles.get(name)
+        if found is None:
+            found = self._vehicles[name] = _Vehicle()
+        return found
 
 
-def _keep(kept: OrderedDict[K, V], key: K, value: V) -> None:
+def _keep(kept: dict[K, V], key: K, value: V, limit: int) -> None:
+    """Put into a dictionary that forgets its oldest half when it is full."""
     kept[key] = value
-    if len(kept) > _KEPT:
-        kept.popitem(last=False)
+    if len(kept) > limit:
+        for old in list(islice(kept, limit // 2)):
+            del kept[old]

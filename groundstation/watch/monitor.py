@@ -1,253 +1,225 @@
-"""What a person wants to know of a running rig: newest values, rates, errors against truth, counters.
+"""What a person wants to know of a running rig: rows of the view, lines of the log, events, latency.
 
-The monitor takes every message, live or in lockstep, and makes the latency ledger's summaries. It
-publishes nothing and decides nothing.
+The monitor takes every message, live from the record stream or in lockstep. It knows no messages: what is
+shown of them is declared by the parts (gauges). It publishes nothing and decides nothing.
+
+Thousands of messages come a second and people look a few times: only what a gauge takes one by one is decoded
+when it comes; of the rest the newest bytes are kept until somebody looks.
 """
 
-import math
 from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.envelope import Delivered
-from groundstation.frames import wrap_angle
-from groundstation.messages import definitions as m
-from groundstation.messages.base import Message
-from groundstation.runtime import ledger
+from groundstation.bus.record_stream import Recorded
+from groundstation.declarations.message import Message
+from groundstation.declarations.tables import Tables
+from groundstation.declarations.topic import Scope
+from groundstation.declarations.view import Cell, Gauge, Newest
+from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.watch.health import Health
+from groundstation.watch.ledger import FOLLOWED, Ledger
 
-ERROR_WINDOW_S = 30.0
-RATE_WINDOW_S = 3.0
-LINES_KEPT = 8
-NIS_KEPT = 30
-
-
-@dataclass(slots=True)
-class Rate:
-    """Messages per second of one topic over the last seconds."""
-
-    _stamps: deque[int] = field(default_factory=deque)
-
-    def count(self, now_ns: int) -> None:
-        """One more."""
-        self._stamps.append(now_ns)
-        while now_ns - self._stamps[0] > RATE_WINDOW_S * 1e9:
-            self._stamps.popleft()
-
-    def hz(self, now_ns: int) -> float:
-        """The rate; 0 when silent."""
-        while self._stamps and now_ns - self._stamps[0] > RATE_WINDOW_S * 1e9:
-            self._stamps.popleft()
-        return len(self._stamps) / RATE_WINDOW_S
-
-
-@dataclass(slots=True)
-class Errors:
-    """Distances of the last seconds between two poses: (stamp, position in m, heading in rad)."""
-
-    _samples: deque[tuple[int, float, float]] = field(default_factory=deque)
-
-    def add(self, now_ns: int, position_m: float, heading_rad: float) -> None:
-        """Take one comparison."""
-        self._samples.append((now_ns, position_m, heading_rad))
-        while now_ns - self._samples[0][0] > ERROR_WINDOW_S * 1e9:
-            self._samples.popleft()
-
-    def rms(self) -> tuple[float, float]:
-        """RMS of position (m) and heading (rad) over the window; NaN when empty."""
-        count = len(self._samples)
-        if not count:
-            return math.nan, math.nan
-        position = math.sqrt(sum(p * p for _, p, _ in self._samples) / count)
-        heading = math.sqrt(sum(h * h for _, _, h in self._samples) / count)
-        return position, heading
+EVENTS_KEPT = 8
 
 
 @dataclass(slots=True)
 class VehicleMonitor:
-    """Everything known about one vehicle."""
+    """One vehicle: its gauges in the order of the view, and the newest messages that they look at."""
 
-    newest: dict[type[Message], Message] = field(default_factory=dict)
-    rates: dict[type[Message], Rate] = field(default_factory=dict)
-    estimate_errors: Errors = field(default_factory=Errors)
-    """Estimate against truth."""
-    station_errors: Errors = field(default_factory=Errors)
-    """Truth against goal."""
-    refused: dict[str, int] = field(default_factory=dict)
-    """Fixes refused, by the kind of reason (what stands before the colon)."""
-    verdict: str = ""
-    """What the referee of two sources of fixes said last."""
-    unused: dict[str, int] = field(default_factory=dict)
-    """Fixes that fusion did not use, by reason."""
-    nis: deque[float] = field(default_factory=lambda: deque(maxlen=NIS_KEPT))
-    """Normalised innovations squared of the newest used fixes."""
+    name: str
+    gauges: tuple[Gauge, ...]
+    garbled: Callable[[str, str, CodecError], None]
+    """Takes owner and noun of a message that cannot be decoded; the value before stays."""
+    newest: Newest = field(default_factory=Newest)
+    undecoded: dict[type[Message], bytes] = field(default_factory=dict)
+    is_known: bool = False
+    """Whether anything came from it."""
 
-    def rate_hz(self, payload: type[Message], now_ns: int) -> float:
-        """Messages per second of a topic."""
-        rate = self.rates.get(payload)
-        return rate.hz(now_ns) if rate is not None else 0.0
+    def labels(self) -> tuple[str, ...]:
+        """Of the rows."""
+        return tuple(gauge.label for gauge in self.gauges if gauge.label)
+
+    def rows(self, now_ns: int) -> list[Cell]:
+        """Cells in the order of ``labels``."""
+        self.refresh()
+        return [gauge.cell(self.newest, now_ns) for gauge in self.gauges if gauge.label]
+
+    def line(self, now_ns: int) -> str:
+        """The most important of it in one line of fixed columns."""
+        self.refresh()
+        phrases = (gauge.phrase(self.newest, now_ns) for gauge in self.gauges)
+        return "  ".join(phrase for phrase in phrases if phrase)
+
+    def refresh(self) -> None:
+        """Decode what came since somebody looked last."""
+        for kind, data in self.undecoded.items():
+            try:
+                self.newest.put(codec_of(kind).decode(data))
+            except CodecError as error:
+                self.garbled(self.name, kind.TOPIC.noun, error)
+        self.undecoded.clear()
 
 
-_RATED: tuple[type[Message], ...] = (m.Imu, m.StarFix, m.VehicleState, m.ValveCommand, m.ValveStatus)
-_SOON_AGAIN = "; next try in "  # what differs from one failure of a port to its next
-SILENT_S = 3.0
-_CONSEQUENCE = {
-    "died": ", no longer used",
-    "moved": ", no longer used",
-    "revived": ", used again",
-    "returned": ", used again",
-    "appeared": ", proposed for the catalogue",
-    "vanished": ", no longer proposed",
-}
+@dataclass(frozen=True, slots=True)
+class _Route:
+    """What becomes of the messages of one class.
 
+    Attributes:
+        kind: The class.
+        takers: Gauges that take each of them, by vehicle.
+        is_decoded: Each is decoded when it comes.
+        is_kept: Somebody wants the newest when he looks.
+        is_rated: Somebody shows how often they come.
+        is_followed: The ledger wants them.
+    """
 
-@dataclass(slots=True)
-class _Line:
-    """What the IMU reader counted on one serial line, and whether it was complained about."""
-
-    bytes_seen: int = 0
-    grows: bool = False
-    is_bad: bool = False
+    kind: type[Message]
+    takers: dict[str, tuple[Gauge, ...]]
+    is_decoded: bool
+    is_kept: bool
+    is_rated: bool
+    is_followed: bool
 
 
 class Monitor:
-    """Takes messages, answers questions."""
+    """Takes messages, answers questions.
 
-    def __init__(self, vehicles: tuple[str, ...]) -> None:
-        self.vehicles = {name: VehicleMonitor() for name in vehicles}
-        self.ledger = ledger.Ledger()
-        self.ports: dict[str, m.Diagnostics] = {}
-        self.nodes: dict[str, m.Diagnostics] = {}
-        self._lines_of: dict[str, _Line] = {}
-        self._silent_nodes: set[str] = set()
-        self.lines: deque[str] = deque(maxlen=LINES_KEPT)
+    Args:
+        tables: Of the parts whose gauges are shown.
+        vehicles: Names of the vehicles.
+
+    Attributes:
+        vehicles: What is known of each.
+        ledger: Of the latency.
+        health: Of ports and nodes.
+        latency: The newest summary of each vehicle.
+        lines: The newest events.
+        undecodable: Messages that do not fit the layout of their class.
+    """
+
+    def __init__(self, tables: Tables, vehicles: tuple[str, ...]) -> None:
+        rows = sorted(
+            (row for part in tables.parts.values() for row in part.gauges), key=lambda row: row.order
+        )
+        self.vehicles = {
+            name: VehicleMonitor(name, tuple(row.make(name) for row in rows), self._count_garbled)
+            for name in vehicles
+        }
+        self.ledger = Ledger()
+        self.health = Health()
+        self.latency: dict[str, Latency] = {}
+        self.lines: deque[str] = deque(maxlen=EVENTS_KEPT)
+        self.undecodable = 0
         self._unread: list[str] = []
+        self._garbled: set[tuple[str, str]] = set()
+        self._routes = {
+            noun: route for noun, kind in tables.payloads.items() if (route := self._route(kind)) is not None
+        }
 
-    def take(self, delivered: Delivered, now_ns: int) -> None:
-        """Account for one message."""
-        payload = delivered.payload
-        if isinstance(payload, m.Diagnostics):
-            self._diagnostics(payload)
+    def take(self, recorded: Recorded, now_ns: int) -> None:
+        """Account for one message of the record stream."""
+        route = self._routes.get(recorded.noun)
+        if route is None:
             return
-        vehicle = self.vehicles.get(payload.vehicle)
-        if vehicle is None:
+        payload = None
+        if route.is_decoded:
+            try:
+                payload = codec_of(route.kind).decode(recorded.data)
+            except CodecError as error:
+                self._count_garbled(recorded.owner, recorded.noun, error)
+                return
+        if route.is_followed:
+            self.ledger.take(recorded, payload)
+        if payload is not None:
+            self._account(route, payload, now_ns)
             return
-        kind = type(payload)
-        if kind in ledger.HEARD:
-            self.ledger.take(delivered)
-        vehicle.newest[kind] = payload
-        if kind in _RATED:
-            vehicle.rates.setdefault(kind, Rate()).count(now_ns)
-        if isinstance(payload, m.ReferenceState):
-            self._compare(vehicle, payload, now_ns)
-        elif isinstance(payload, m.FixAccount):
-            if not payload.used:
-                vehicle.unused[payload.reason] = vehicle.unused.get(payload.reason, 0) + 1
-            elif math.isfinite(payload.nis):
-                vehicle.nis.append(payload.nis)
-        elif isinstance(payload, m.StarFix) and not payload.fix:
-            kind_of_refusal = payload.reason.partition(":")[0]
-            vehicle.refused[kind_of_refusal] = vehicle.refused.get(kind_of_refusal, 0) + 1
-        elif isinstance(payload, m.SequencePhase):
-            self.say(
-                f"{payload.vehicle}: {payload.phase}" + (f" ({payload.detail})" if payload.detail else "")
-            )
-        elif isinstance(payload, m.FixComparison):
-            self._referee(vehicle, payload)
-        elif isinstance(payload, m.SkyChange):
-            star = f"star {payload.star}" if payload.star else "a light that is no star"
-            self.say(
-                f"{payload.vehicle}: {star} {payload.change} at ({payload.x_m:.3f}, {payload.y_m:.3f}) m"
-                f"{_CONSEQUENCE.get(payload.change, '')}"
-            )
-        elif isinstance(payload, m.Ack) and not payload.accepted:
-            self.say(f"{payload.vehicle}: {payload.action} refused: {payload.reason}")
+        for vehicle in self._concerned(recorded.owner):
+            vehicle.is_known |= bool(recorded.owner)
+            if route.is_rated:
+                vehicle.newest.count(route.kind, now_ns)
+            if route.is_kept:
+                vehicle.undecoded[route.kind] = recorded.data
 
-    def say(self, line: str) -> None:
-        """Keep a line for people; the newest few are shown."""
+    def take_delivered(self, delivered: Delivered, now_ns: int) -> None:
+        """Account for one message that was never encoded."""
+        route = self._routes.get(delivered.envelope.topic.noun)
+        if route is not None:
+            if route.is_followed:
+                self.ledger.take_delivered(delivered)
+            self._account(route, delivered.payload, now_ns)
+
+    def note(self, line: str) -> None:
+        """Keep an event for people; the newest few are shown."""
         self.lines.append(line)
         self._unread.append(line)
 
     def take_lines(self) -> list[str]:
-        """Lines since the last call, for a log."""
+        """Events since the last call, for a log."""
         lines, self._unread = self._unread, []
         return lines
 
     def look(self, now_ns: int) -> None:
-        """Say what is open and yet silent, or full of noise; call about once a second."""
-        for name, vehicle in self.vehicles.items():
-            port = self.ports.get(f"{name}/imu")
-            line = self._lines_of.setdefault(name, _Line())
-            is_bad = (
-                port is not None
-                and port.level == 0
-                and now_ns - port.stamp_ns > SILENT_S * 1e9
-                and vehicle.rate_hz(m.Imu, now_ns) == 0.0
-            )
-            if is_bad and not line.is_bad:
-                what = (
-                    "noise and no frame: another baud rate, or another device?"
-                    if line.grows
-                    else "open, but no byte comes: is the block switched on?"
-                )
-                self.say(f"{name}/imu: {what} Listening on")
-            elif line.is_bad and not is_bad:
-                self.say(f"{name}/imu: samples come")
-            line.is_bad = is_bad
-            self._look_at_valves(name, vehicle, now_ns)
+        """Let the gauges find what is silent or wrong; call about once a second."""
+        for vehicle in self.vehicles.values():
+            vehicle.refresh()
+            for gauge in vehicle.gauges:
+                for line in gauge.look(vehicle.newest, now_ns):
+                    self.note(line)
 
-    def _look_at_valves(self, name: str, vehicle: VehicleMonitor, now_ns: int) -> None:
-        bus = self.ports.get("valve_bus")
-        is_silent = (
-            bus is not None
-            and bus.level == 0
-            and now_ns - bus.stamp_ns > SILENT_S * 1e9
-            and vehicle.rate_hz(m.ValveStatus, now_ns) == 0.0
-        )
-        if is_silent and name not in self._silent_nodes:
-            self._silent_nodes.add(name)
-            self.say(f"{name}: its valve node says nothing; without word from us it keeps its valves closed")
-        elif not is_silent and name in self._silent_nodes:
-            self._silent_nodes.discard(name)
-            self.say(f"{name}: its valve node speaks")
+    def summarise_latency(self, now_ns: int) -> Iterable[Latency]:
+        """Make the ledger's summaries; call about once a second and publish what it returns."""
+        for name in self.vehicles:
+            self.latency[name] = self.ledger.summary(name, now_ns)
+        return tuple(self.latency.values())
 
-    def _referee(self, vehicle: VehicleMonitor, payload: m.FixComparison) -> None:
-        """Say when two sources of fixes begin to disagree, and when they agree again."""
-        if payload.verdict != vehicle.verdict and "disagree" in (payload.verdict, vehicle.verdict):
-            says = f"{payload.verdict}: {payload.reason}" if payload.reason else payload.verdict
-            self.say(f"{payload.vehicle}: star fixes and overhead fixes {says}")
-        vehicle.verdict = payload.verdict
+    def _route(self, kind: type[Message]) -> _Route | None:
+        gauges = [gauge for vehicle in self.vehicles.values() for gauge in vehicle.gauges]
+        takers = {
+            name: tuple(gauge for gauge in vehicle.gauges if kind in gauge.every)
+            for name, vehicle in self.vehicles.items()
+        }
+        is_kept = any(kind in gauge.newest for gauge in gauges)
+        is_rated = any(kind in gauge.rated for gauge in gauges)
+        is_followed = FOLLOWED.get(kind.TOPIC.noun) is kind
+        is_taken = any(takers.values()) or kind is Diagnostics
+        if not (is_taken or is_kept or is_rated or is_followed):
+            return None
+        # whose a message of a process is, stands in the message alone
+        is_decoded = is_taken or kind.TOPIC.scope is Scope.PROCESS
+        return _Route(kind, takers, is_decoded, is_kept, is_rated, is_followed)
 
-    def _diagnostics(self, payload: m.Diagnostics) -> None:
-        is_port = bool(payload.summary) and not payload.keys
-        known = self.ports if is_port else self.nodes
-        before = known.get(payload.node)
-        known[payload.node] = payload
-        counters = dict(zip(payload.keys, payload.values, strict=False))
-        if "bytes_seen" in counters:
-            line = self._lines_of.setdefault(payload.node.partition("/")[0], _Line())
-            seen = int(counters["bytes_seen"])
-            line.bytes_seen, line.grows = seen, seen > line.bytes_seen
-        said = payload.summary.partition(_SOON_AGAIN)[0]
-        is_news = before is None or before.summary.partition(_SOON_AGAIN)[0] != said
-        if said and (is_news or (is_port and payload.level == 0)):  # an opened port is always news
-            self.say(payload.summary)
+    def _concerned(self, vehicle: str) -> Iterable[VehicleMonitor]:
+        """Whose view a message of a vehicle changes; what belongs to the rig concerns all."""
+        found = self.vehicles.get(vehicle)
+        if found is not None:
+            return (found,)
+        return () if vehicle else self.vehicles.values()
 
-    @staticmethod
-    def _compare(vehicle: VehicleMonitor, truth: m.ReferenceState, now_ns: int) -> None:
-        state = vehicle.newest.get(m.VehicleState)
-        if isinstance(state, m.VehicleState) and state.status == "flying":
-            age_s = (truth.stamp_ns - state.stamp_ns) * 1e-9
-            dx = state.position_table_m[0] + state.velocity_table_m_s[0] * age_s - truth.position_table_m[0]
-            dy = state.position_table_m[1] + state.velocity_table_m_s[1] * age_s - truth.position_table_m[1]
-            turn = wrap_angle(state.heading_rad + state.rate_rad_s * age_s - truth.heading_rad)
-            vehicle.estimate_errors.add(now_ns, math.hypot(dx, dy), turn)
-        goal = vehicle.newest.get(m.ControlStatus)
-        phase = vehicle.newest.get(m.SequencePhase)
-        if (
-            isinstance(goal, m.ControlStatus)
-            and isinstance(phase, m.SequencePhase)
-            and phase.phase == "flying"
-        ):
-            dx = goal.goal_position_table_m[0] - truth.position_table_m[0]
-            dy = goal.goal_position_table_m[1] - truth.position_table_m[1]
-            turn = wrap_angle(goal.goal_heading_rad - truth.heading_rad)
-            vehicle.station_errors.add(now_ns, math.hypot(dx, dy), turn)
+    def _account(self, route: _Route, payload: Message, now_ns: int) -> None:
+        kind, name = route.kind, payload.vehicle
+        events: dict[str, None] = {}  # what several vehicles' gauges make of one message is one event
+        if isinstance(payload, Diagnostics):
+            news = self.health.take(payload)
+            if news:
+                events[news] = None
+        for vehicle in self._concerned(name):
+            vehicle.is_known |= bool(name)
+            if route.is_rated:
+                vehicle.newest.count(kind, now_ns)
+            if route.is_kept:
+                vehicle.newest.put(payload)
+        for owner in (name,) if name else self.vehicles:
+            for gauge in route.takers.get(owner, ()):
+                for event in gauge.take(payload, now_ns):
+                    events[event] = None
+        for event in events:
+            self.note(event)
+
+    def _count_garbled(self, owner: str, noun: str, error: CodecError) -> None:
+        self.undecodable += 1
+        if (owner, noun) not in self._garbled:
+            self._garbled.add((owner, noun))
+            self.note(f"a message on {owner}/{noun} cannot be decoded: {error}")

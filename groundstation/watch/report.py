@@ -1,25 +1,33 @@
-"""The report of a recording: ``report.json`` and figures that people would rather look at than read."""
+"""The report of a recording: ``report.json`` and figures that people would rather look at than read.
+
+Its numbers are those that the parts declare (``Figure``); the latency is the ledger's own.
+"""
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from groundstation.messages import definitions as m
+from groundstation.bus.envelope import Delivered
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.message import Message
+from groundstation.declarations.tables import Tables
+from groundstation.declarations.view import Figure
+from groundstation.parts.operation.messages import Latency
+from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
-from groundstation.runtime.tracks import Track, estimate_errors, read_tracks, station_errors
-
-SETTLING_S = 20.0
-"""Left out of the station-keeping figures after the vehicle began to fly."""
+from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
+from groundstation.watch.tracks import DRAWN, Track, TrackBuilder
 
 Progress = Callable[[str, float], None]
-Array = NDArray[np.float64]
+
+
+class VehicleReport(NamedTuple):
+    """What a recording says of one vehicle: arrays for figures, and numbers for ``report.json``."""
+
+    track: Track
+    numbers: dict[str, Any]
 
 
 def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path]:
@@ -29,12 +37,14 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         UsageError: The recording holds no vehicle's state.
     """
     progress("reading the recording", 0.0)
+    tables = installed_tables()
     with Recording(recording) as source:
-        tracks = read_tracks(source)
+        reports = summarise(tables, source.delivered(wanted(tables)), source.start_ns)
         duration_s = (source.stop_ns - source.start_ns) * 1e-9
-    if not tracks:
+    if not reports:
         raise UsageError(f"{recording}: holds no vehicle state, so there is nothing to report")
     folder.mkdir(parents=True, exist_ok=True)
+    tracks = {name: report.track for name, report in reports.items()}
     figures = {
         "table.png": draw_table,
         "errors.png": draw_errors,
@@ -50,7 +60,7 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
     summary = {
         "recording": recording.name,
         "duration_s": duration_s,
-        "vehicles": {name: summarise(track) for name, track in tracks.items()},
+        "vehicles": {name: report.numbers for name, report in reports.items()},
     }
     path = folder / "report.json"
     path.write_text(json.dumps(_plain(summary), indent=1) + "\n")
@@ -58,54 +68,63 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
     return [path, *written]
 
 
-def summarise(track: Track) -> dict[str, Any]:
-    """The numbers of one vehicle."""
-    station, estimate = station_errors(track), estimate_errors(track)
-    settled = station[station[:, 0] >= track.flying_since_s + SETTLING_S]
-    flown = estimate[estimate[:, 0] >= track.flying_since_s + SETTLING_S]
-    latency = track.latency
-    used = track.accounts[(track.accounts[:, 1] == 1.0) & np.isfinite(track.accounts[:, 5])]
-    return {
-        "flying_since_s": track.flying_since_s,
-        "settled_for_s": float(np.ptp(settled[:, 0])) if len(settled) else 0.0,
-        "station_position_rms_mm": _rms(settled[:, 1]) * 1e3,
-        "station_position_max_mm": float(settled[:, 1].max() * 1e3) if len(settled) else math.nan,
-        "station_heading_rms_deg": math.degrees(_rms(settled[:, 2])),
-        "estimate_position_rms_mm": _rms(np.hypot(flown[:, 1], flown[:, 2])) * 1e3,
-        "estimate_heading_rms_deg": math.degrees(_rms(flown[:, 3])),
-        "imu_frames": track.imu_frames,
-        "imu_frames_lost": track.frames_lost,
-        "fixes": track.fixes,
-        "fix_innovation_position_rms_mm": _rms(np.hypot(used[:, 2], used[:, 3])) * 1e3,
-        "fix_innovation_heading_rms_deg": math.degrees(_rms(used[:, 4])),
-        "fix_nis_mean": float(used[:, 5].mean()) if len(used) else math.nan,
-        **({"star_against_overhead": compared(track.comparisons)} if track.comparisons else {}),
-        "latency_p50_ms": {} if latency is None else _stages(latency, latency.p50_s),
-        "latency_p99_ms": {} if latency is None else _stages(latency, latency.p99_s),
-    }
+def wanted(tables: Tables) -> list[type[Message]]:
+    """Classes that a report is made from."""
+    figures = (make() for part in tables.parts.values() for make in part.figures)
+    return list(dict.fromkeys([*DRAWN, *(kind for figure in figures for kind in figure.inputs)]))
 
 
-def compared(pairs: list[m.FixComparison]) -> dict[str, Any]:
-    """Star fixes against overhead fixes over a whole recording, and the last verdict of the referee."""
-    differences = np.array([pair.difference for pair in pairs])
-    mean, rms = differences.mean(axis=0), np.sqrt((differences**2).mean(axis=0))
-    return {
-        "pairs": len(pairs),
-        "mean_mm_mm_deg": [*(mean[:2] * 1e3).tolist(), math.degrees(mean[2])],
-        "rms_mm_mm_deg": [*(rms[:2] * 1e3).tolist(), math.degrees(rms[2])],
-        "nis_over_3": float(np.mean([pair.nis for pair in pairs])) / 3.0,
-        "disagreed_ratio": float(np.mean([pair.verdict == "disagree" for pair in pairs])),
-        "last_verdict": pairs[-1].verdict,
-        "reason": pairs[-1].reason,
-    }
+def summarise(tables: Tables, messages: Iterable[Delivered], start_ns: int) -> dict[str, VehicleReport]:
+    """Read messages into reports, by vehicle.
+
+    Args:
+        tables: Of the parts whose figures are wanted.
+        messages: Of the classes that ``wanted`` names, in the order of a recording.
+        start_ns: When the recording began.
+
+    Returns:
+        The vehicles of which there is a state.
+    """
+    collectors: dict[str, _Collector] = {}
+    for _, payload in messages:
+        name = payload.vehicle
+        if name:
+            collector = collectors.get(name)
+            if collector is None:
+                collector = collectors[name] = _Collector(tables)
+            collector.take(payload, (payload.stamp_ns - start_ns) * 1e-9)
+    reports = {name: collector.report() for name, collector in collectors.items()}
+    return {name: report for name, report in reports.items() if len(report.track.state)}
 
 
-def _stages(latency: m.Latency, ages_s: tuple[float, ...]) -> dict[str, float]:
+class _Collector:
+    """Makes the report of one vehicle."""
+
+    def __init__(self, tables: Tables) -> None:
+        self._track = TrackBuilder()
+        self._figures: list[Figure] = [make() for part in tables.parts.values() for make in part.figures]
+        self._takers: dict[type[Message], list[Callable[[Message, float], None]]] = {}
+        for kind in DRAWN:
+            self._takers.setdefault(kind, []).append(self._track.take)
+        for figure in self._figures:
+            for kind in figure.inputs:
+                self._takers.setdefault(kind, []).append(figure.take)
+
+    def take(self, payload: Message, t_s: float) -> None:
+        for take in self._takers.get(type(payload), ()):
+            take(payload, t_s)
+
+    def report(self) -> VehicleReport:
+        track = self._track.track()
+        numbers = {key: value for figure in self._figures for key, value in figure.values().items()}
+        latency = track.latency
+        numbers["latency_p50_ms"] = {} if latency is None else _stages(latency, latency.p50_s)
+        numbers["latency_p99_ms"] = {} if latency is None else _stages(latency, latency.p99_s)
+        return VehicleReport(track, numbers)
+
+
+def _stages(latency: Latency, ages_s: tuple[float, ...]) -> dict[str, float]:
     return {stage: age * 1e3 for stage, age in zip(latency.stages, ages_s, strict=True)}
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 any JSON value

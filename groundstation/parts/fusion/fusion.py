@@ -43,6 +43,7 @@ class Fusion(Node):
         stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
+    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Request)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(

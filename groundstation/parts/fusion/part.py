@@ -54,7 +54,8 @@ def _check_sources(rig: Rig, name: str) -> None:
     for source in named:
         if source not in known:
             raise ValueError(
-                f"vehicles.{name}.fix_sources: {source!r} is no source of fixes (there are {', '.join(known)})"
+                f"vehicles.{name}.fix_sources: {source!r} is no source of fixes "
+                f"(there are {', '.join(known)})"
             )
         if not known[source].condition(rig, name):
             raise ValueError(f"vehicles.{name}: fix_sources {source!r} needs {known[source].needs}")
@@ -65,7 +66,8 @@ def _check_sources(rig: Rig, name: str) -> None:
     method = rig.of_type(name, FusionOfType).fusion.method
     if len(fused) > 1 and method != "filter":
         raise ValueError(
-            f"vehicles.{name}.fix_sources: the estimator {method!r} takes one source: choose 'filter', or name one"
+            f"vehicles.{name}.fix_sources: the estimator {method!r} takes one source: "
+            "choose 'filter', or name one"
         )
 
 
@@ -73,7 +75,7 @@ PART = Part(
     name="fusion",
     summary="samples and late fixes become the state of the centre of mass",
     topics=(VehicleState, FixAccount, FusionStatus, FusionCalibration),
-    nodes=(NodeRow("fusion", FLIGHT, Weight.URGENT, _fusion),),
+    nodes=(NodeRow("fusion", FLIGHT, Weight.URGENT, Fusion, _fusion),),
     mock_up=FusionOfType,
     vehicle=FusionOfVehicle,
     check=_check,

@@ -25,6 +25,11 @@ from groundstation.parts.stars.sections import StarCameraSection, StarsOfType, S
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
+# OpenCV loads only where these run
+_SPOTS = "groundstation.parts.stars.spot_finder:SpotFinder"
+_TRACKER = "groundstation.parts.stars.star_tracker:StarTracker"
+_KEEPER = "groundstation.parts.stars.picture_keeper:PictureKeeper"
+
 
 def _has_camera(rig: Rig, vehicle: str) -> bool:
     return rig.vehicle(vehicle, StarsOfVehicle).star_camera is not None
@@ -113,12 +118,29 @@ PART = Part(
     summary="pictures of the ceiling become spots, stars and fixes",
     topics=(StarImage, StarSpots, StarFix, StarMatches, StarPicture, SkyChange, FixBytes),
     nodes=(
-        NodeRow("fix_reader", FLIGHT, Weight.LIGHT, _fix_reader, _has_stream),
-        NodeRow("spot_finder", SKY, Weight.HEAVY, _spot_finder, _has_camera),
-        NodeRow("star_tracker", SKY, Weight.HEAVY, _star_tracker, _has_camera),
-        NodeRow("picture_keeper", SKY, Weight.HEAVY, _picture_keeper, _has_camera),
+        NodeRow("fix_reader", FLIGHT, Weight.LIGHT, FixReader, _fix_reader, _has_stream),
+        NodeRow("spot_finder", SKY, Weight.HEAVY, _SPOTS, _spot_finder, _has_camera),
+        NodeRow(
+            "star_tracker",
+            SKY,
+            Weight.HEAVY,
+            _TRACKER,
+            _star_tracker,
+            _has_camera,
+        ),
+        NodeRow(
+            "picture_keeper",
+            SKY,
+            Weight.HEAVY,
+            _KEEPER,
+            _picture_keeper,
+            _has_camera,
+        ),
     ),
-    ports=(PortRow("spot_finder", _camera_port), PortRow("fix_reader", _stream_port)),
+    ports=(
+        PortRow("spot_finder", StarCameraPort, _camera_port),
+        PortRow("fix_reader", FixStreamPort, _stream_port),
+    ),
     actions=(PICTURE,),
     fix_sources=(FixSource("stars", StarFix, _has_stars, _floor, "'star_camera' or 'fixes'"),),
     mock_up=StarsOfType,

@@ -1,0 +1,101 @@
+"""What people are shown of the valves: gate, open valves, whose command, the tank, a silent valve node."""
+
+import math
+from collections.abc import Iterator
+
+from groundstation.declarations.message import Message
+from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
+
+SILENT_S = 3.0
+"""So long after the bus was opened a valve node should have reported."""
+BUS = "valve_bus"
+"""Channel of the bus that all valve nodes share."""
+_VALVES = 8
+
+
+class GateGauge(Gauge):
+    """Armed state, gate and open valves; reports a valve node from which nothing comes."""
+
+    label = "valves"
+    every = (Diagnostics,)
+    newest = (VehicleMode, ValveCommand, ValveStatus)
+    rated = (ValveStatus,)
+
+    def __init__(self, vehicle: str) -> None:
+        super().__init__(vehicle)
+        self._open_since_ns: int | None = None
+        self._is_silent = False
+
+    def take(self, message: Message, now_ns: int) -> Iterator[str]:
+        del now_ns
+        assert isinstance(message, Diagnostics)
+        if message.node == BUS:
+            self._open_since_ns = message.stamp_ns if message.level == 0 else None
+        yield from ()
+
+    def look(self, newest: Newest, now_ns: int) -> Iterator[str]:
+        opened_ns, was_silent = self._open_since_ns, self._is_silent
+        self._is_silent = (
+            opened_ns is not None
+            and now_ns - opened_ns > SILENT_S * 1e9
+            and newest.rate_hz(ValveStatus, now_ns) == 0.0
+        )
+        if self._is_silent and not was_silent:
+            yield (
+                f"{self.vehicle}: nothing comes from its valve node; "
+                "while no command reaches it, it keeps its valves closed"
+            )
+        elif was_silent and not self._is_silent:
+            yield f"{self.vehicle}: its valve node reports"
+
+    def cell(self, newest: Newest, now_ns: int) -> Cell:
+        del now_ns
+        mode, command, status = newest.get(VehicleMode), newest.get(ValveCommand), newest.get(ValveStatus)
+        if command is None:
+            return NOTHING
+        is_armed = mode is not None and mode.armed
+        level = Level.GOOD if command.gate == "open" else Level.WARNING
+        shown = cell(f"{'armed' if is_armed else 'disarmed'}, {command.gate} ", level)
+        if status is None:
+            return shown + cell("·" * _VALVES)
+        shown += cell("".join("●" if status.open_mask >> valve & 1 else "·" for valve in range(_VALVES)))
+        return shown + cell(" dead man", Level.BAD) if status.dead_man else shown
+
+    def phrase(self, newest: Newest, now_ns: int) -> str:
+        del now_ns
+        command = newest.get(ValveCommand)
+        return f"{'-' if command is None else command.gate:<8}"
+
+
+class SourceGauge(Gauge):
+    """Whose command the valves carry out."""
+
+    label = "commanded by"
+    newest = (ValveSelection,)
+
+    def cell(self, newest: Newest, now_ns: int) -> Cell:
+        del now_ns
+        selection = newest.get(ValveSelection)
+        if selection is None:
+            return NOTHING
+        text = selection.source + (f": {selection.reason}" if selection.reason else "")
+        return cell(text, Level.WARNING if selection.source in ("stop", "brake") else Level.PLAIN)
+
+
+class TankGauge(Gauge):
+    """Pressure, and whether the float air is on."""
+
+    label = "tank"
+    newest = (ValveStatus,)
+
+    def cell(self, newest: Newest, now_ns: int) -> Cell:
+        del now_ns
+        status = newest.get(ValveStatus)
+        if status is None or math.isnan(status.pressure_pa):
+            return NOTHING
+        return cell(f"{status.pressure_pa * 1e-5:.0f} bar" + ("" if status.floating else ", float air off"))
+
+
+GAUGES = (GaugeRow(20, GateGauge), GaugeRow(30, SourceGauge), GaugeRow(130, TankGauge))
