@@ -47,9 +47,9 @@ class Launcher:
 
     Args:
         rig: The rig.
-        rig_path: Its file.
-        rig_text: What the file said when the rig was read; holds, as do the files that it names, for the
+        rig_text: What its file said when the rig was read; holds, as do the files that it names, for the
             whole run.
+        rig_path: The file.
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
 
@@ -57,7 +57,7 @@ class Launcher:
         RigError: The rig names a laboratory that is not installed.
     """
 
-    def __init__(self, rig: Rig, rig_path: Path, rig_text: str, recording: Path | None, say: Say) -> None:
+    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path | None, say: Say) -> None:
         self._rig_path = rig_path
         self._rig_text = rig_text
         self._files = bytes_of(rig)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
-from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
+from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
 from groundstation.bus.zenoh_bus import RECORD, split_key
 from groundstation.declarations.rig import Rig
 from groundstation.launch.launcher import Launcher
@@ -27,18 +27,20 @@ class LiveRun:
 
     Args:
         rig: The rig.
-        rig_path: Its file.
-        rig_text: What the file said when the rig was read.
+        rig_text: What its file said when the rig was read.
+        rig_path: The file.
         recording: Where the recorder writes.
     """
 
-    def __init__(self, rig: Rig, rig_path: Path, rig_text: str, recording: Path) -> None:
+    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path) -> None:
         self.rig = rig
         self.recording = recording
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
-        self.launcher = Launcher(rig, rig_path, rig_text, recording, self.monitor.note)
+        self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
         self._batches: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
+        self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
         self._announcement: Path | None = None
@@ -98,7 +100,17 @@ class LiveRun:
                 continue
             now_ns = time.monotonic_ns()
             for entry in entries:
-                self.monitor.take(entry, now_ns)
+                if not self._is_repeated(entry):
+                    self.monitor.take(entry, now_ns)
+
+    def _is_repeated(self, entry: Recorded) -> bool:
+        """Whether it is a latched message that came before: publishers repeat them for late joiners."""
+        noun, owner, sequence = entry[:3]
+        if noun not in self._latching:
+            return False
+        is_repeated = self._latched.get((noun, owner)) == sequence
+        self._latched[noun, owner] = sequence
+        return is_repeated
 
     def _publish_latency(self) -> None:
         """Publish the ledger's summaries, on their own keys and in a record stream."""
