@@ -100,6 +100,8 @@ def call(words: list[str]) -> int:
 def main() -> None:
     """Entry point."""
     words = sys.argv[1:]
+    if words[:1] == ["run"]:  # before NumPy loads: a run forks its processes, and threads are not forked
+        os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
     try:
         code = call(words)
     except KeyboardInterrupt:  # before a command took the signal over: nothing had been started yet

@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from groundstation.cli.errors import UsageError
-from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
 from groundstation.declarations.errors import GroundStationError
 from groundstation.launch.live_run import LiveRun
@@ -68,6 +67,8 @@ def run(
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
+        from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
+
         print_report(finished[-1], report)
 
 
