@@ -21,11 +21,11 @@ from groundstation.cli.fusion import estimate
 from groundstation.cli.fusion_folder import FusionFolder, write_atomically
 from groundstation.cli.table_map import map_of_sources
 from groundstation.cli.table_map_flights import read_source
+from groundstation.files.errors import FileError
 from groundstation.fusion.constants import CONSTANTS
 from groundstation.fusion.estimator import FixAccount
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.fusion.table_map import TableMapError
 
 WIDE_GATE = 60.0
 """While a scale is still unknown, good fixes look worse than they are."""
@@ -104,8 +104,8 @@ def joint(
     if made is not None and table_map is not None:
         try:
             made.save(table_map)
-        except TableMapError as error:
-            raise UsageError(f"{error}.") from None
+        except FileError as error:
+            raise UsageError(str(error)) from None
     write_atomically({out: [result.to_toml()]})
     for name, quantity in quantities.items():
         print(f"{name} = {quantity.value:.6g} ± {quantity.std:.2g} {quantity.unit}")

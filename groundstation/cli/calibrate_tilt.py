@@ -22,9 +22,10 @@ from calibration.result import CalibrationResult, Provenance, Quantity, provenan
 from groundstation.cli.errors import UsageError
 from groundstation.cli.flight_data import read_flight
 from groundstation.cli.fusion_folder import Array, FusionFolder, read_table, write_atomically
+from groundstation.files.errors import FileError
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
-from groundstation.fusion.table_map import TableMap, TableMapError
+from groundstation.fusion.table_map import TableMap
 
 TILT_COLUMNS = ("along_x_deg", "along_y_deg")
 UNITS = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}
@@ -87,8 +88,8 @@ def tilt(
 def _map(path: Path) -> TableMap:
     try:
         return TableMap.load(path)
-    except TableMapError as error:
-        raise UsageError(f"{error}.") from None
+    except FileError as error:
+        raise UsageError(str(error)) from None
 
 
 def _rests_of(

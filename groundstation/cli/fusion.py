@@ -14,6 +14,7 @@ import typer
 
 from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
+from groundstation.files.errors import FileError
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
@@ -21,7 +22,7 @@ from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 from groundstation.fusion.stamp_ticks import StampTicks
-from groundstation.fusion.table_map import TableMap, TableMapError
+from groundstation.fusion.table_map import TableMap
 from groundstation.runtime.estimation import slope_grid
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
@@ -96,8 +97,8 @@ def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth
 def _read_map(path: Path) -> SlopeGrid:
     try:
         return slope_grid(TableMap.load(path))
-    except TableMapError as error:
-        raise UsageError(f"{error}.") from None
+    except FileError as error:
+        raise UsageError(str(error)) from None
 
 
 def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:

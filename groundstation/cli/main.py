@@ -78,7 +78,7 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
-    from groundstation.files.errors import CalibrationFileError
+    from groundstation.files.errors import FileError
     from groundstation.recording.errors import RecordingError
     from groundstation.runtime.errors import GroundStationError, UsageError
 
@@ -86,7 +86,7 @@ def call(words: list[str]) -> int:
         build(words[0] if words else None)(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
-    except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:
+    except (UsageError, DeviceError, RecordingError, FileError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 2
     except GroundStationError as error:

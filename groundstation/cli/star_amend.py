@@ -14,7 +14,7 @@ from calibration.sky.amendment import Amendment, AmendmentError, NewPlace, propo
 from groundstation.bus.topics import topic_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import check_targets, write_atomically
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.messages import definitions as m
 from groundstation.nodes.star_answers import change_of
 from groundstation.recording.errors import RecordingError
@@ -45,7 +45,7 @@ def amend(
     check_targets(out, beside)
     try:
         names = StarCatalogue.load(ceiling).ids
-    except CalibrationFileError as error:
+    except FileError as error:
         raise UsageError(str(error)) from error
     text = ceiling.read_text(encoding="utf-8")
     found, catalogues = _findings(recording)

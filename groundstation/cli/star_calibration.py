@@ -18,7 +18,7 @@ from groundstation.cli.delay_source import Turns, turns_of
 from groundstation.cli.errors import UsageError
 from groundstation.cli.star_files import check_targets, find_frames, read_frame, with_progress
 from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -165,7 +165,7 @@ def _pictures(folder: Path) -> tuple[CameraCalibration, StarCatalogue, list[Spot
     camera = _camera(folder / "camera.json")
     try:
         catalogue = StarCatalogue.load(folder / "ceiling.csv")
-    except CalibrationFileError as error:
+    except FileError as error:
         raise UsageError(str(error)) from error
     frames = find_frames(folder)
     pictures = [detect(read_frame(path, camera)) for path in with_progress(frames, "finding stars")]
@@ -190,7 +190,7 @@ def _same_size(frames: list[Path]) -> Iterator[NDArray[np.uint8]]:
 def _camera(path: Path) -> CameraCalibration:
     try:
         return CameraCalibration.load(path)
-    except CalibrationFileError as error:
+    except FileError as error:
         raise UsageError(str(error)) from error
 
 

@@ -31,7 +31,7 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_plots import save_figure
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
@@ -172,7 +172,7 @@ def _lens(path: Path) -> OverheadCamera:
     try:
         return OverheadCamera.from_mapping({**unknown, **data})
     except ValueError as error:
-        raise CalibrationFileError(f"{path}: {error}.") from error
+        raise FileError(f"{path}: {error}.") from error
 
 
 def _read_places(path: Path, frames: set[str]) -> dict[str, tuple[float, float, float]]:

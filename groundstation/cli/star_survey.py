@@ -18,7 +18,7 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_outcome import progress_line, refusing, write_outcome
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 
@@ -55,7 +55,7 @@ def survey(
         raise UsageError(f"{out}: is the name of the provenance; call the catalogue {out.stem}.csv.")
     try:
         camera = CameraCalibration.load(folder / "camera.json")
-    except CalibrationFileError as error:
+    except FileError as error:
         raise UsageError(str(error)) from error
     frames = find_frames(folder)
     names = [path.stem for path in frames]

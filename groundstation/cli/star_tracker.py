@@ -27,7 +27,7 @@ from groundstation.cli.star_files import (
     write_atomically,
 )
 from groundstation.cli.star_pictures import PictureFolder
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
@@ -121,7 +121,7 @@ def load_sky(folder: Path) -> tuple[CameraCalibration, StarCatalogue]:
         raise UsageError(f"{folder}: no such folder.")
     try:
         return CameraCalibration.load(folder / "camera.json"), StarCatalogue.load(folder / "ceiling.csv")
-    except CalibrationFileError as error:
+    except FileError as error:
         raise UsageError(str(error)) from error
 
 

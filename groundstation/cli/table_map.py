@@ -20,8 +20,9 @@ from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import SurfaceFit, fit_surface
 from groundstation.cli.errors import UsageError
 from groundstation.cli.table_map_flights import Bounds, Source, read_source
+from groundstation.files.errors import FileError
 from groundstation.fusion.levelling import Levelling, levelling
-from groundstation.fusion.table_map import G_M_S2, MapProvenance, TableMap, TableMapError
+from groundstation.fusion.table_map import G_M_S2, MapProvenance, TableMap
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
@@ -76,8 +77,8 @@ def table_map(
         plot_map(made, fit.waviness_m_s2, logs, legs, advice, plot)
     try:
         made.save(out)
-    except TableMapError as error:
-        raise UsageError(f"{error}.") from error
+    except FileError as error:
+        raise UsageError(str(error)) from error
     print("\n".join(verdicts))
 
 

@@ -12,9 +12,9 @@ from groundstation.frames import wrap_angle
 from groundstation.messages.base import Message
 from groundstation.messages.definitions import CalibrationInUse, OverheadFix, OverheadImage
 from groundstation.nodes.node import Node
+from groundstation.overhead import tracker as overhead
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead import tracker as overhead
 
 
 class OverheadTracker(Node):
