@@ -17,6 +17,13 @@ if TYPE_CHECKING:
 DPI = 110
 
 
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure of a size in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
 def write_png(path: Path, what: Figure | NDArray[np.uint8]) -> None:
     """Write a figure, or a picture (h, w) or (h, w, 3) in blue-green-red, whole or not at all.
 

@@ -75,7 +75,7 @@ def parse_table(
         path: Its name, for what is said of it.
         numbers: Columns of numbers.
         words: Columns of text; cells are stripped.
-        optional: Those of ``numbers`` that may be missing; they are then NaN.
+        optional: Columns that may be missing; numbers are then NaN, words empty.
         unique: Those of ``words`` in which no cell may appear twice.
         is_finite: Whether NaN and infinity are refused.
 
@@ -85,7 +85,7 @@ def parse_table(
     """
     text = text_of(data, path)
     header_line, header, delimiter = _header(text, path, (*words, *numbers))
-    at = _places(header, path, header_line, (*words, *(n for n in numbers if n not in optional)))
+    _check(header, path, header_line, [name for name in (*words, *numbers) if name not in optional])
     wanted = [header.index(name) if name in header else -1 for name in numbers]
     if not words:
         found = _fast(text, header_line, len(header), delimiter, wanted, is_finite=is_finite)
@@ -98,7 +98,7 @@ def parse_table(
         if len(cells) != len(header):
             raise FileError(f"{path}: line {line} has {len(cells)} columns, expected {len(header)}.")
         for name in words:
-            cell = cells[at[name]].strip()
+            cell = cells[header.index(name)].strip() if name in header else ""
             if name in unique and cell in said[name]:
                 first = lines[said[name].index(cell)]
                 raise FileError(f"{path}: line {line}, {name} '{cell}' appears twice, first in line {first}.")
@@ -138,14 +138,13 @@ def _header(text: str, path: Path, known: Sequence[str]) -> tuple[int, list[str]
     raise FileError(f"{path}: is empty, expected the header {','.join(known)}.")
 
 
-def _places(header: list[str], path: Path, line: int, needed: Sequence[str]) -> dict[str, int]:
+def _check(header: list[str], path: Path, line: int, needed: Sequence[str]) -> None:
     for name in needed:
         if name not in header:
             raise FileError(f"{path}: line {line}, column '{name}' is missing; found {', '.join(header)}.")
     for name in header:
         if name and header.count(name) > 1:
             raise FileError(f"{path}: line {line}, column '{name}' appears twice.")
-    return {name: header.index(name) for name in needed}
 
 
 def _fast(

@@ -134,11 +134,15 @@ class TableMap:
         Raises:
             FileError: the folder does not exist or may not be written.
         """
+        write_files(self.files(path))
+
+    def files(self, path: Path) -> dict[Path, bytes | str]:
+        """Return what is written: `path` (TOML) and the grid beside it (`.npz`)."""
         memory = io.BytesIO()
         np.savez_compressed(memory, **{name: getattr(self, name) for name in _ARRAYS}, allow_pickle=False)
         grid, grid_path = memory.getvalue(), path.with_suffix(".npz")
         text = self._text(grid_path.name, hashlib.sha256(grid).hexdigest())
-        write_files({grid_path: grid, path: text})
+        return {grid_path: grid, path: text}
 
     def _text(self, grid_name: str, grid_sha256: str) -> str:
         said = self.provenance

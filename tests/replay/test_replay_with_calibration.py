@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
+from calibration.table.smoothed_flights import read_source
 from groundstation.bus.topics import topic_of
-from groundstation.cli.table_map_flights import read_source
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.messages.definitions import FusionCalibration
 from groundstation.recording.reader import Recording
