@@ -1,10 +1,30 @@
 """What holds for all tests: hypothesis draws the same examples everywhere and measures no time."""
 
+from collections.abc import Callable
+
 import pytest
+from click.testing import Result
 from hypothesis import settings
+from typer.testing import CliRunner
 
 settings.register_profile("everywhere", deadline=None, derandomize=True)
 settings.load_profile("everywhere")
+
+
+@pytest.fixture(scope="session")
+def groundstation() -> Callable[..., Result]:
+    """The command line: words in, its result out; what it refuses is raised as it was inside."""
+
+    def call(*words: object) -> Result:
+        from groundstation.cli.main import build, spelled
+
+        given = spelled([str(word) for word in words])
+        result = CliRunner().invoke(build(given), given)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return call
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.runners.lockstep_run import make_runner
+from groundstation.runners.make_runner import make_runner
 from groundstation.rig.read import parse_rig
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"

@@ -7,7 +7,7 @@ from groundstation.bus.topics import topic_of
 from groundstation.cli.vehicle_rows import LABELS, rows_of
 from groundstation.parts.fusion.messages import FixAccount
 from groundstation.parts.stars.messages import StarFix
-from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.watch.monitor import Monitor
 from groundstation.watch.report import write_report
 from groundstation.rig.read import load_rig

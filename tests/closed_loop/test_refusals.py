@@ -11,9 +11,9 @@ from groundstation.cli.errors import UsageError
 from groundstation.cli.recording import app
 from groundstation.parts.stars.messages import StarFix, StarMatches
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.watch.monitor import Monitor
-from groundstation.runtime.node_table import make_node
+from groundstation.rig.plan import make_node
 from groundstation.runners.replay import ReplayRunner
 from groundstation.rig.read import parse_rig
 

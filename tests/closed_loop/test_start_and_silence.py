@@ -8,7 +8,7 @@ from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
 from groundstation.declarations.node import Node
 from groundstation.declarations.errors import RigError
-from groundstation.runners.lockstep_run import make_runner
+from groundstation.runners.make_runner import make_runner
 from groundstation.runners.slot import NodeSlot
 
 SILENT_S = 5.0

@@ -8,13 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import topic_of
-from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.declarations.request import Request
 from groundstation.parts.control.messages import Wrench
@@ -116,7 +114,7 @@ def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(
 
 @pytest.mark.slow
 def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end_nearer(
-    fly, tmp_path, monkeypatch
+    fly, tmp_path, monkeypatch, groundstation
 ):
     seed = 3
     spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
@@ -131,7 +129,7 @@ def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end
     rig = load_rig(rig_path)
     with Recorder(laps, recording_info(rig, rig_path, seed, None)) as recorder:
         survey_laps.fly(rig, 240.0, [recorder.record], seed)
-    result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
+    result = groundstation("calibrate", "table-map", laps, "--out", made)
     assert result.exit_code == 0, result.output
     without, gas_without, _ = tour(fly, 3, seed)
     with_map, gas_with, _ = tour(fly, 3, seed, made)

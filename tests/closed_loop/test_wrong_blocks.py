@@ -4,7 +4,7 @@ from pathlib import Path
 
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.runners.lockstep_run import make_runner
+from groundstation.runners.make_runner import make_runner
 from groundstation.rig.read import parse_rig
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"

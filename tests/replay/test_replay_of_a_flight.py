@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import NODES, make_node
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.rig.plan import make_node
+from groundstation.runtime.node_table import NODES
 from groundstation.runners.replay import ReplayRunner, recorded_nodes
 from groundstation.rig.read import load_rig, parse_rig
 

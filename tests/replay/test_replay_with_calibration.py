@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
+from calibration.table.smoothed_flights import read_source
 from groundstation.bus.topics import topic_of
-from groundstation.cli.table_map_flights import read_source
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.parts.fusion.messages import FusionCalibration
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import make_node
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.rig.plan import make_node
 from groundstation.runners.replay import ReplayRunner
 from groundstation.rig.read import load_rig, parse_rig
 

@@ -96,10 +96,10 @@ def test_constants_of_files_are_weighed_against_the_rigs(tmp_path):
 @pytest.mark.parametrize(
     ("table", "imu", "said"),
     [
-        ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml cannot be read"),
-        ('map = "torn.toml"', "", r"table\.map: .*torn\.toml is not valid TOML"),
+        ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml: cannot be read"),
+        ('map = "torn.toml"', "", r"table\.map: .*torn\.toml: is not valid TOML"),
         ('map = "joint.toml"', "", r"table\.map: .*joint\.toml: key grid is missing"),
-        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration: .*nowhere\.toml cannot be read"),
+        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration: .*nowhere\.toml: cannot be read"),
         ("", 'calibration = ["rest.toml"]', r"rest\.toml holds no constant that lasts"),
         ("", 'calibration = ["unit.toml"]', r"unit\.toml: lever_x must be in the unit 'm', found 'mm'"),
     ],

@@ -1,4 +1,4 @@
-"""What every calibration of the sky gives back."""
+"""What every calibration gives back, and how it refuses."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from calibration.result import CalibrationResult, Provenance, Quantity
+from groundstation.cli.progress import Progress
+from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.star_tracking.camera_model import CameraCalibration
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Progress = Callable[[str, float], None]
-"""Told what is going on and how much of it is done, 0 to 1; NaN where nobody knows."""
+Note = float | int | str | bool | Sequence[str]
+"""What else belongs to the record."""
 
 
 class CalibrationRefusedError(ValueError):
@@ -23,36 +25,31 @@ class CalibrationRefusedError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """A calibration of the sky.
+    """A calibration.
 
     Attributes:
         title: What was calibrated.
-        summary: The result in one line, for people.
+        summary: The result in a line or several, for people.
         quantities: Calibrated numbers by name, with one sigma.
         residual: How well the data fit.
         notes: Counts and names that belong to the record.
-        draw: Makes the figure of the residuals; nothing is drawn before.
+        draw: Makes the figure of the residuals, where there is one; nothing is drawn before.
         warnings: What may be wrong although there is a result, one sentence each.
-        camera: The camera with the new values; None if none of them are the camera's.
+        camera: The camera with the new values; None if none of them are a camera's.
     """
 
     title: str
     summary: str
     quantities: Mapping[str, Quantity]
     residual: Mapping[str, Quantity]
-    notes: Mapping[str, float | int | str | bool | Sequence[str]]
-    draw: Callable[[], Figure]
+    notes: Mapping[str, Note]
+    draw: Callable[[], Figure] | None = None
     warnings: tuple[str, ...] = ()
-    camera: CameraCalibration | None = field(default=None)
+    camera: CameraCalibration | OverheadCamera | None = field(default=None)
 
     def to_toml(self, provenance: Provenance) -> str:
         """The result as TOML, with where its data come from."""
         return CalibrationResult(self.title, provenance, self.quantities, self.residual, self.notes).to_toml()
-
-
-def silent(what: str, share: float) -> None:
-    """Tell nobody of the progress."""
-    del what, share
 
 
 def adjusting(progress: Progress) -> Callable[[int, float], None]:

@@ -1,14 +1,11 @@
-"""Figures of calibrations; matplotlib loads only when one is asked for."""
+"""Figures of the IMU's calibrations."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibration.imu.allan import AllanDeviation
@@ -16,31 +13,22 @@ from calibration.imu.gyro_scale import GyroScale
 from calibration.imu.temperature import TemperatureSlope
 from calibration.imu.tilt_axes import TiltAxes
 from calibration.imu.zero_offset import ZeroOffset
-from groundstation.cli.errors import UsageError
+from groundstation.files.png import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-
-
-def _save(figure: Figure, path: Path) -> None:
-    """Write a PNG whole or not at all."""
-    FigureCanvasAgg(figure)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        figure.savefig(part, format="png", dpi=110)
-        os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror}.") from None
-    finally:
-        part.unlink(missing_ok=True)
+Draw = Callable[[], "Figure"]
 
 
 def _axes(figure: Figure, rows: int) -> list[Any]:
     return list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
 
 
-def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
+def draw_rest(rest: Array, found: ZeroOffset) -> Figure:
     """Draw the rest's packets (n, 5), its mean, and what was cut out."""
-    figure = Figure(figsize=(9, 7), layout="constrained")
+    figure = new_figure(9.0, 7.0)
     for k, (axes, label) in enumerate(
         zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
     ):
@@ -54,12 +42,12 @@ def plot_rest(rest: Array, found: ZeroOffset, path: Path) -> None:
             axes.axvspan(cut.start_s - 0.02, cut.end_s + 0.02, color="tab:red", alpha=0.3, label=once)
         axes.legend(loc="upper right", ncols=3, fontsize=8)
     axes.set_xlabel("time, s")
-    _save(figure, path)
+    return figure
 
 
-def plot_temperature(found: TemperatureSlope, path: Path) -> None:
+def draw_temperature(found: TemperatureSlope) -> Figure:
     """Draw block means against temperature with the fitted lines."""
-    figure = Figure(figsize=(8, 7), layout="constrained")
+    figure = new_figure(8.0, 7.0)
     heat = found.block_temperature_c
     for k, (axes, label) in enumerate(
         zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
@@ -71,12 +59,12 @@ def plot_temperature(found: TemperatureSlope, path: Path) -> None:
             f"{found.slope[k]:.3g} ± {found.slope_std[k]:.1g} {label.split()[1]} per °C", fontsize=9
         )
     axes.set_xlabel("temperature, °C")
-    _save(figure, path)
+    return figure
 
 
-def plot_scale(found: GyroScale, path: Path) -> None:
+def draw_scale(found: GyroScale) -> Figure:
     """Draw the heading residuals of the turns."""
-    figure = Figure(figsize=(8, 4), layout="constrained")
+    figure = new_figure(8.0, 4.0)
     (axes,) = _axes(figure, 1)
     residual = np.degrees(found.residual_rad)
     axes.plot(found.fix_s[found.is_used], residual[found.is_used], ".", label=f"{found.used} used")
@@ -87,12 +75,12 @@ def plot_scale(found: GyroScale, path: Path) -> None:
     axes.set_xlabel("exposure, s")
     axes.set_ylabel("star heading less gyro, °")
     axes.legend()
-    _save(figure, path)
+    return figure
 
 
-def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: Path) -> None:
+def draw_allan(curves: dict[str, AllanDeviation], units: dict[str, str]) -> Figure:
     """Draw the Allan deviations with their white-noise slopes."""
-    figure = Figure(figsize=(8, 8), layout="constrained")
+    figure = new_figure(8.0, 8.0)
     for axes, (name, curve) in zip(_axes(figure, len(curves)), curves.items(), strict=True):
         axes.errorbar(curve.tau_s, curve.deviation, curve.std, fmt=".-", markersize=3, linewidth=0.8)
         axes.plot(
@@ -104,12 +92,12 @@ def plot_allan(curves: dict[str, AllanDeviation], units: dict[str, str], path: P
         axes.set_ylabel(f"{name}, {units[name].replace('^2', '²')}")
         axes.legend(fontsize=8)
     axes.set_xlabel("averaging time, s")
-    _save(figure, path)
+    return figure
 
 
-def plot_residuals(residual: Array, nis: Array, path: Path) -> None:
+def draw_residuals(residual: Array, nis: Array) -> Figure:
     """Draw fix less smoothed pose (m, 4: s, m, m, rad), and the filter's NIS."""
-    figure = Figure(figsize=(9, 8), layout="constrained")
+    figure = new_figure(9.0, 8.0)
     axes = _axes(figure, 4)
     for k, (label, factor) in enumerate((("x, mm", 1e3), ("y, mm", 1e3), ("heading, °", 180.0 / np.pi))):
         axes[k].plot(residual[:, 0], factor * residual[:, k + 1], ".", markersize=4)
@@ -120,12 +108,12 @@ def plot_residuals(residual: Array, nis: Array, path: Path) -> None:
     axes[3].set_ylabel("NIS")
     axes[3].legend()
     axes[3].set_xlabel("exposure, s")
-    _save(figure, path)
+    return figure
 
 
-def plot_tilt(found: TiltAxes, path: Path) -> None:
+def draw_tilt(found: TiltAxes) -> Figure:
     """Draw what is left of each rest's readings, with the sigmas expected of it."""
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = new_figure(9.0, 6.0)
     number = np.arange(1, len(found.residual_m_s2) + 1)
     for k, axes in enumerate(_axes(figure, 2)):
         axes.errorbar(
@@ -145,12 +133,12 @@ def plot_tilt(found: TiltAxes, path: Path) -> None:
         + "".join(f"\nunknown: {words}" for words in found.unknown),
         fontsize=10,
     )
-    _save(figure, path)
+    return figure
 
 
-def plot_offset_fit(residual_m: Array, path: Path) -> None:
+def draw_offset_fit(residual_m: Array) -> Figure:
     """Draw how far the integrated way of the published fit misses the fixes, (2, m)."""
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    figure = new_figure(8.0, 5.0)
     number = np.arange(2, residual_m.shape[1] + 2)
     for k, axes in enumerate(_axes(figure, 2)):
         axes.plot(number, 1e3 * residual_m[k], ".-", linewidth=0.6)
@@ -158,4 +146,4 @@ def plot_offset_fit(residual_m: Array, path: Path) -> None:
         axes.set_ylabel(f"fix less integration, {'xy'[k]}, mm")
         axes.grid(alpha=0.3)
     axes.set_xlabel("fix of the stretch")
-    _save(figure, path)
+    return figure

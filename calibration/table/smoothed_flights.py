@@ -11,21 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from calibration.flights import fuse, opened
+from calibration.outcome import CalibrationRefusedError
 from calibration.table.flight_log import FlightLog
-from groundstation.bus.topics import topic_of
 from groundstation.cli.errors import UsageError
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.estimator import Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.messages import definitions as m
-from groundstation.nodes.fusion import Fusion
-from groundstation.recording.errors import RecordingError
-from groundstation.recording.reader import Recording
-from groundstation.runtime.errors import RigError
-from groundstation.runtime.estimation import fused_floors_of, rig_noise
-from groundstation.runtime.rig import load_rig, parse_rig
+from groundstation.parts.fusion.estimation import rig_noise
 
 Array = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -34,7 +29,6 @@ REFERENCE_C = 25.0
 CLOCK_SMOOTHING_S = 10.0
 """Ticks are laid on the stamps by a mean over this time: quartz drifts slowly, stamps jitter."""
 WILD_SIGMAS = 8.0
-HEARD = tuple(topic_of(kind) for kind in (m.Imu, m.StarFix, m.OverheadFix, m.ValveStatus, m.Request))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +83,10 @@ def read_source(path: Path, rig_path: Path | None, vehicle: str | None) -> Sourc
     """Read and smooth a recording (.mcap) or a folder with imu.csv, stars.csv and meta.json.
 
     Raises:
-        UsageError: something is missing or wrong, or no vehicle flew.
+        RecordingError: The recording cannot be read.
+        UsageError: Something of it or of its rig is missing or wrong.
+        FileError: Something of the folder is.
+        CalibrationRefusedError: No vehicle flew.
     """
     if path.is_dir():
         data = read_folder(path)
@@ -97,30 +94,14 @@ def read_source(path: Path, rig_path: Path | None, vehicle: str | None) -> Sourc
         estimate(data, tap)
         tap.settled()
         return Source(path, (_flight_log(path.name, tap),), None)
-    try:
-        with Recording(path) as recording:
-            return _read_recording(path, recording, rig_path, vehicle)
-    except (RecordingError, RigError) as error:
-        raise UsageError(str(error)) from error
-
-
-def _read_recording(path: Path, recording: Recording, rig_path: Path | None, vehicle: str | None) -> Source:
-    if rig_path is not None:
-        rig = load_rig(rig_path)
-    elif recording.info.rig_toml:
-        rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path or path))
-    else:
-        raise UsageError(f"{path} says nothing of its rig: name one with --rig.")
-    if vehicle is not None and vehicle not in rig.vehicles:
-        raise UsageError(f"{path} has no vehicle {vehicle!r}; there are {', '.join(rig.vehicles)}.")
-    logs = []
-    for name in rig.vehicles if vehicle is None else (vehicle,):
-        tap = _Tap(rig_noise(rig, name))
-        node = Fusion(name, tap, "filter", fused_floors_of(rig, name))
-        for message in recording.messages(HEARD, (name,)):
-            for _ in node.receive(message.payload, message.log_ns):
-                pass
-        logs.append(_flight_log(f"{path.name}:{name}", tap))
+    with opened(path, rig_path) as (recording, rig):
+        if vehicle is not None and vehicle not in rig.vehicles:
+            raise UsageError(f"{path} has no vehicle {vehicle!r}; there are {', '.join(rig.vehicles)}.")
+        logs = []
+        for name in rig.vehicles if vehicle is None else (vehicle,):
+            tap = _Tap(rig_noise(rig, name))
+            fuse(recording, rig, name, tap)
+            logs.append(_flight_log(f"{path.name}:{name}", tap))
     table = rig.table
     edges = (table.x_min_m, table.x_max_m, table.y_min_m, table.y_max_m)
     return Source(path, tuple(logs), edges, table.legs)
@@ -131,7 +112,7 @@ def _flight_log(name: str, tap: _Tap) -> FlightLog:
     states = tap.states()
     known = [i for i, state in enumerate(states) if state is not None]
     if len(known) < 2:
-        raise UsageError(f"{name} never had a pose: no two of its {len(tap.fixes)} fixes agree.")
+        raise CalibrationRefusedError(f"{name} never had a pose: no two of its {len(tap.fixes)} fixes agree")
     first, last = known[0], known[-1]
     origin_ns = tap.packets[first].t_ns - 1_000_000_000
     noise = tap.noise

@@ -1,22 +1,21 @@
-"""The picture of a table map: waves with arrows and track, relief, uncertainty, what to do with the legs."""
+"""The figure of a table map: waves with arrows and track, relief, uncertainty, what to do with the legs."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from calibration.table.flight_log import FlightLog
-from groundstation.cli.errors import UsageError
+from groundstation.files.png import new_figure
 from groundstation.fusion.levelling import Levelling
 from groundstation.fusion.table_map import G_M_S2, TableMap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Legs = Mapping[str, tuple[float, float]]
@@ -29,35 +28,22 @@ ARROW_STEPS = 1.4
 """Length of the longest arrow in distances between arrows."""
 
 
-def plot_map(
+def draw_map(
     made: TableMap,
     waviness_m_s2: float,
     logs: Sequence[FlightLog],
     legs: Legs,
     advice: Levelling | None,
-    path: Path,
-) -> None:
-    """Draw a map.
-
-    Raises:
-        UsageError: the file cannot be written.
-    """
-    figure = Figure(figsize=(15.0, 8.6))
+) -> Figure:
+    """Draw a map."""
+    figure = new_figure(15.0, 8.6)
     figure.set_layout_engine("constrained", h_pad=0.1)
-    FigureCanvasAgg(figure)
     places = figure.add_gridspec(2, 2, width_ratios=[1.9, 1.0], hspace=0.12)
     veil = np.hypot(made.std_x_m_s2, made.std_y_m_s2) / np.sqrt(2.0) > UNKNOWN * waviness_m_s2
     _draw_waves(figure, figure.add_subplot(places[:, 0]), made, veil, logs, legs, advice)
     _draw_relief(figure, figure.add_subplot(places[0, 1]), made, veil)
     _draw_sigma(figure, figure.add_subplot(places[1, 1]), made, logs)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        figure.savefig(part, format="png", dpi=110)
-        os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror}.") from None
-    finally:
-        part.unlink(missing_ok=True)
+    return figure
 
 
 def _draw_waves(
