@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.bus.topics import topic_of
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.recording.reader import Recording

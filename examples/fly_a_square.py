@@ -13,19 +13,20 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from groundstation.runtime.node_table import build_slots
+from groundstation.runtime.ports import ports_of
+
 from drivers.laboratory import load_laboratory
 from groundstation.bus.journal import JournalWriter
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.operation.messages import SequencePhase
-from groundstation.declarations.node import Node
 from groundstation.recording.writer import Recorder
-from groundstation.runners.lockstep import LockstepRunner, Observer
-from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.ports import ports_of
 from groundstation.rig.provenance import recording_info
 from groundstation.rig.read import load_rig
+from groundstation.runners.lockstep import LockstepRunner, Observer
 from groundstation.runners.slot import NodeSlot, Sequences
 
 Corners = tuple[tuple[float, float], ...]

@@ -13,7 +13,6 @@ import numpy as np
 
 from drivers.imu_block.protocol import FrameParser, ImuFrame
 from drivers.imu_block.sensors import rate_rad_s, specific_force_m_s2
-from groundstation.bus.topics import topic_of
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.recording.reader import Recording
 

@@ -12,9 +12,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.terminal_view import TerminalView
-from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.recording.writer import PART_SUFFIX

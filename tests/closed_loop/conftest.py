@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.runners.make_runner import make_runner
 from groundstation.rig.read import parse_rig
+from groundstation.runners.make_runner import make_runner
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 SHORT_REST = "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n"

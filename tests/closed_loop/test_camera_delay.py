@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay

@@ -2,15 +2,15 @@
 
 import json
 
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
 from groundstation.cli.vehicle_rows import LABELS, rows_of
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.messages import FixAccount
 from groundstation.parts.stars.messages import StarFix
-from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 from groundstation.watch.monitor import Monitor
 from groundstation.watch.report import write_report
-from groundstation.rig.read import load_rig
 
 WRONG = (
     '\n[[laboratory.faults]]\nkind = "false_lights"\nvehicle = "alpha"\nstart_s = 4.0\nend_s = 6.0\n'

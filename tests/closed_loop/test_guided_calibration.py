@@ -4,7 +4,6 @@ import pytest
 
 from calibration import wizard
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
 from groundstation.declarations.request import Request
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.stars.messages import StarFix

@@ -7,15 +7,15 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.bus.envelope import Delivered
-from groundstation.cli.errors import UsageError
 from groundstation.cli.recording import app
+from groundstation.declarations.errors import UsageError
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.stars.messages import StarFix, StarMatches
 from groundstation.recording.reader import Recording
-from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.watch.monitor import Monitor
 from groundstation.rig.plan import make_node
-from groundstation.runners.replay import ReplayRunner
 from groundstation.rig.read import parse_rig
+from groundstation.runners.replay import ReplayRunner
+from groundstation.watch.monitor import Monitor
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "published.toml"
 MORE = """

@@ -5,12 +5,10 @@ import math
 import pytest
 
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.declarations.request import Ack, Request
+from groundstation.declarations.request import ACTIONS, Ack, Request
 from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
-from groundstation.declarations.request import ACTIONS
 
 
 def ask(flight, action, *numbers, vehicle="alpha", request_id=7):

@@ -2,12 +2,12 @@
 
 import pytest
 
+from groundstation.declarations.errors import RigError
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
-from groundstation.declarations.node import Node
-from groundstation.declarations.errors import RigError
 from groundstation.runners.make_runner import make_runner
 from groundstation.runners.slot import NodeSlot
 

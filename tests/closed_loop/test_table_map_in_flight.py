@@ -12,9 +12,8 @@ import pytest
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.declarations.request import Request
+from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.reference.messages import ReferenceState

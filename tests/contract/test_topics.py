@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from groundstation.bus.topics import TOPICS, topic_named, topic_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -19,10 +20,9 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from groundstation.bus.topics import TOPICS, topic_named, topic_of
-from groundstation.declarations.message import Message
 from groundstation.bus.cdr import CodecError, ros_fields
 from groundstation.bus.ros_schema import ENCODING, register, schema_text
+from groundstation.declarations.message import Message
 
 rows = pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.noun)
 

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import pytest
+from groundstation.runtime.node_table import build_slots
+from groundstation.runtime.ports import ports_of
 
 from drivers.laboratory import load_laboratory
 from groundstation.bus.journal import JournalWriter
@@ -11,10 +13,8 @@ from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runners.lockstep import LockstepRunner
-from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.ports import ports_of
 from groundstation.rig.read import load_rig
+from groundstation.runners.lockstep import LockstepRunner
 from groundstation.runners.slot import Sequences
 
 ROOT = Path(__file__).parents[2]

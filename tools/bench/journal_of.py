@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator
 
-from groundstation.bus.journal import Kind, read_entries
-from groundstation.bus.topics import topic_of
+from groundstation.bus.journal import Journal, Kind, read_entries
 from groundstation.declarations.message import Message
-from groundstation.bus.journal import Journal
 from groundstation.recording.reader import Recording
 
 Made = dict[int, int]

@@ -9,13 +9,12 @@ import numpy as np
 
 from bench.journal_of import consumed, made_from
 from bench.rows import RIGS, ROOT, Bench, Row
-from groundstation.bus.topics import topic_of
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.parts.stars.messages import StarFix
-from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recorded, Recording
-from groundstation.declarations.rig import Rig
 from groundstation.rig.read import load_rig
 
 RIG = RIGS / "two_mock_ups.toml"

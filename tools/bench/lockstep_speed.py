@@ -1,7 +1,8 @@
 """Seconds of flight per second of CPU in lockstep: nodes, runner and emulator, with and without recording."""
 
-from bench.rows import RIGS, Bench, CpuTime, Row
 from groundstation.runners.lockstep_run import make_runner, run_lockstep
+
+from bench.rows import RIGS, Bench, CpuTime, Row
 from groundstation.rig.read import load_rig
 
 CASES = (

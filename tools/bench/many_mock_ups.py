@@ -10,19 +10,20 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
+from groundstation.runners.lockstep_run import run_lockstep
+from groundstation.runtime.node_table import make_node
+
 from bench.limits import at_most
 from bench.rows import RIGS, Bench, Row
 from groundstation.bus.envelope import Delivered
-from groundstation.declarations.topic import Scope
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
+from groundstation.declarations.rig import Rig
+from groundstation.declarations.topic import Scope
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import make_node
-from groundstation.runners.replay import ReplayRunner
-from groundstation.declarations.rig import Rig
 from groundstation.rig.read import load_rig, parse_rig
+from groundstation.runners.replay import ReplayRunner
 
 ORIGINAL = "alpha"
 NODES = ("imu_reader", "fusion")

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from groundstation.runners.lockstep_run import run_lockstep
+
 from bench.rows import RIGS, Bench, CpuTime, Row
 from drivers.imu_block.protocol import FrameParser, ImuFrame, encode_v1
-from groundstation.bus.topics import topic_of
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
 from groundstation.rig.read import load_rig
 
 STREAM_HZ = 1000.0

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from groundstation.runners.lockstep_run import run_lockstep
 
 from bench.rows import RIGS, Bench, Row
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.watch.report import summarise
 from groundstation.rig.read import load_rig
+from groundstation.watch.report import summarise
 from groundstation.watch.tracks import read_tracks
 
 FLOWN_S = 120.0

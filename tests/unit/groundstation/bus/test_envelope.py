@@ -1,11 +1,11 @@
 """Envelopes travel as attachments: whole or refused."""
 
 import pytest
+from groundstation.bus.topics import TOPICS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.bus.envelope import Cause, Envelope
-from groundstation.bus.topics import TOPICS
 
 U32 = st.integers(0, 2**32 - 1)
 envelopes = st.builds(

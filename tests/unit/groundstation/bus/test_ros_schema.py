@@ -1,13 +1,13 @@
 """The definition texts against rosbags' own copies of the ROS 2 packages."""
 
 import pytest
+from groundstation.bus.topics import TOPICS
 from rosbags.typesys import Stores, get_typestore
 
-from groundstation.bus.topics import TOPICS
+from groundstation.bus.ros_schema import is_standard, message_text, register, schema_text
+from groundstation.declarations.message import PACKAGE
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.stars.messages import StarFix, StarImage, StarPicture
-from groundstation.declarations.message import PACKAGE
-from groundstation.bus.ros_schema import is_standard, message_text, register, schema_text
 
 CLASSES = [topic.payload for topic in TOPICS]
 

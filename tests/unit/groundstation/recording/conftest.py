@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from groundstation.bus.cdr import ros_fields
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.declarations.topic import Scope
 from groundstation.bus.journal import Journal
+from groundstation.declarations.topic import Scope
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.parts.valves.messages import CanIn
-from groundstation.bus.cdr import ros_fields
 
 PERIOD_NS = 10_000_000
 

@@ -1,9 +1,8 @@
 import pytest
+from groundstation.bus.topics import topic_named
 
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import topic_named, topic_of
-from groundstation.bus.journal import Journal
+from groundstation.bus.journal import Journal, JournalWriter, Kind
 from groundstation.recording.causes import CauseIndex, Reference
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo

@@ -4,10 +4,10 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.recording import app
+from groundstation.declarations.errors import UsageError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.declarations.errors import UsageError
 
 
 @pytest.fixture

@@ -3,10 +3,10 @@
 import itertools
 
 import pytest
+from groundstation.bus.topics import TOPICS, topic_named
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from groundstation.bus.topics import TOPICS, topic_named, topic_of
 from groundstation.parts.control.messages import Wrench
 from groundstation.recording.channels import channel_name, parse_channel
 from groundstation.recording.errors import RecordingError
