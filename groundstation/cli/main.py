@@ -79,6 +79,7 @@ def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from calibration.camera.errors import CalibrationFileError
     from drivers.errors import DeviceError
+    from groundstation.core.library import CoreError
     from groundstation.recording.errors import RecordingError
     from groundstation.runtime.errors import GroundStationError, UsageError
 
@@ -89,7 +90,7 @@ def call(words: list[str]) -> int:
     except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 2
-    except GroundStationError as error:
+    except (GroundStationError, CoreError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 1
     return 0

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from groundstation.cli.errors import UsageError
 from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.core.library import default_core
 from groundstation.recording.writer import PART_SUFFIX
 from groundstation.runtime.errors import GroundStationError
 from groundstation.runtime.live_run import LiveRun
@@ -51,6 +52,7 @@ def run(
       groundstation run examples/rigs/two_mock_ups.toml
       groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
+    default_core()  # before any process starts: what it lacks, all of them would
     loaded = load_rig(rig)
     check_rig(loaded)
     check_addresses(loaded)

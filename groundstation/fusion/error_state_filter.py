@@ -13,12 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.core.library import Core, default_core
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
 from groundstation.fusion.carrier import Carrier
-from groundstation.fusion.compiled_reckoner import make_reckoner
+from groundstation.fusion.compiled_reckoner import Reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S, FirstFixes
@@ -52,15 +51,13 @@ class ErrorStateFilter:
         noise: sensors and table of this mock-up.
         trace: where to write down every step for a smoother; all packets are then kept.
         table_map: what calibration knows of the table's slope; the filter estimates what is left of it.
-        core: compiled core or ``PURE``; the default is the compiled one where there is one. Equal answers.
+
+    Raises:
+        CoreError: there is no compiled core.
     """
 
     def __init__(
-        self,
-        noise: NoiseModel,
-        trace: Trace | None = None,
-        table_map: SlopeGrid | None = None,
-        core: Core | None = None,
+        self, noise: NoiseModel, trace: Trace | None = None, table_map: SlopeGrid | None = None
     ) -> None:
         self.noise = noise
         self._map = table_map
@@ -72,10 +69,10 @@ class ErrorStateFilter:
         """(23 + 2m, 23 + 2m) covariance there."""
         self._surface = LearnedSurface.untouched(noise)
         self._look_due_ns = 0
-        core = core or default_core()
-        self._reckoner = make_reckoner(noise, self.counters, table_map, core)
-        self._carrier = Carrier(noise, table_map, core)
-        self._late_fix = LateFix(noise, core)
+        self._reckoner = Reckoner(noise, self.counters, table_map)
+        self._carrier = Carrier(noise, table_map)
+        self._late_fix = LateFix(noise)
+        self._checkpoint_s = 0.0
         self._first_fixes = FirstFixes()
         self._past = PastFixes()
         self._rests = Rests()
@@ -99,7 +96,7 @@ class ErrorStateFilter:
             self._integrate_to_now()
 
     def _tell_rest(self) -> None:
-        self._reckoner.rest_from_s, self._reckoner.rest_to_s = self._rests.newest
+        self._reckoner.rest(*self._rests.newest)
 
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Integrate one packet; None before the first fix, or when the packet was refused."""
@@ -121,7 +118,7 @@ class ErrorStateFilter:
 
     def covariance(self) -> Array:
         """Return (6, 6) of x, y, heading, vx, vy, omega of the centre of mass now."""
-        _, x, P = self._propagate(self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        _, x, P = self._propagate(self._checkpoint_s, self._reckoner.newest_s)
         H = measurements.reported(x, self._reckoner.omega_rad_s)
         C: Array = H @ P[: es.SIZE, : es.SIZE] @ H.T
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
@@ -193,7 +190,7 @@ class ErrorStateFilter:
         self._past.meet(fix.source)
         if not reckoner.has_pose:
             return self._consider(fix)
-        if t <= reckoner.checkpoint_s:
+        if t <= self._checkpoint_s:
             return self._insert(fix, t)
         return self._correct(fix, t)
 
@@ -220,13 +217,13 @@ class ErrorStateFilter:
         self._past.replace(pasts)
         self.x, self.P, self._surface = last.x, last.P, last.surface
         self._creep = copy.copy(last.creep)
-        self._reckoner.checkpoint_s = last.t_s
+        self._checkpoint_s = last.t_s
 
     def _correct(self, fix: Fix, t: float, *, is_late: bool = False) -> FixAccount:
         """Carry the checkpoint to the exposure and correct there, unless the fix lies outside the gate."""
         reckoner = self._reckoner
         steps: list[Step] = []
-        surface, x, P = self._propagate(reckoner.checkpoint_s, t, steps)
+        surface, x, P = self._propagate(self._checkpoint_s, t, steps)
         omega_read = self._reckoner.history.omega_at(t)
         z, H = measurements.predict_fix(fix, x, omega_read, self.noise)
         R = measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], self.noise)
@@ -236,7 +233,7 @@ class ErrorStateFilter:
                 self.counters.add("fix_outside_the_gate")
                 return _account(fix, "outside the gate", z, nis)
             return self._contradicted(fix, t, z, nis)
-        creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - reckoner.checkpoint_s)
+        creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - self._checkpoint_s)
         P[es.GYRO_BIAS, es.GYRO_BIAS] += creeping
         reckoner.is_lost = False
         if self._trace is not None:
@@ -323,7 +320,7 @@ class ErrorStateFilter:
     ) -> None:
         """Make the corrected state at `t` the checkpoint and, unless later fixes follow, integrate to now."""
         self.x, self.P, self._surface = x, 0.5 * (P + P.T), surface
-        self._reckoner.checkpoint_s = t
+        self._checkpoint_s = t
         oldest = self._past.note(Past(t, fix, self.x, self.P, surface, copy.copy(self._creep)))
         if is_late:
             return
@@ -377,7 +374,7 @@ class ErrorStateFilter:
         """Write down the way from the last used fix to the newest packet, for the smoother."""
         if self._trace is not None and self._trace.chains:
             steps: list[Step] = []
-            self._propagate(self._reckoner.checkpoint_s, self._reckoner.newest_s, steps)
+            self._propagate(self._checkpoint_s, self._reckoner.newest_s, steps)
             self._trace.chains[-1].steps += steps
 
     def _learn(self, x: Array, P: Array, segment: Segment) -> Corrected | None:
@@ -394,7 +391,7 @@ class ErrorStateFilter:
         if not self._reckoner.has_pose:
             return
         x, here = self.x.copy(), slice(es.WAVE_X, es.WAVE_Y + 1)
-        stretches = self._rests.stretches(self._reckoner.checkpoint_s, self._reckoner.newest_s)
+        stretches = self._rests.stretches(self._checkpoint_s, self._reckoner.newest_s)
         is_short = len(stretches) == 1  # then one look, in its middle and that of the second to come, will do
         for a, b, resting in stretches:
             if resting:
@@ -412,7 +409,7 @@ class ErrorStateFilter:
         noise = self._noise_in_doubt if self._doubt.is_open else self.noise
         variance = self._late_fix.variance_in_time(self.x, self.P, noise)
         measurements.add_scale_in_time(variance, self.P, self._reckoner.omega_rad_s)
-        self._reckoner.variance = variance
+        self._reckoner.trust(self._checkpoint_s, variance)
 
     def _seconds(self, t_ns: int) -> float:
         return (t_ns - (self._reckoner.origin_ns or 0)) * 1e-9

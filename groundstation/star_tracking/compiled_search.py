@@ -1,138 +1,87 @@
-"""The search of ``search`` in the compiled core: one call per picture, with equal answers."""
+"""From spots to a pose: tracking from a prior, or lost in space; one call of the core per picture.
+
+Lost in space: triangles of neighbouring spots are looked up among the catalogue's triangles; each hit
+is a pose; all poses are tested at once on the raster of nearest stars; the best are refined and must
+pass the likelihood test. Pictures with few spots go on with pairs. The work is capped, so a picture
+that shows no ceiling costs a bounded time. With a prior, the stars near where it puts the spots are
+matched directly, and lost-in-space is the fallback.
+
+The steps are ``core/star_*.c``.
+"""
 
 import math
-from ctypes import Structure, byref, c_double, c_int64, c_void_p
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.core.library import Core
-from groundstation.star_tracking import motion as smear
-from groundstation.star_tracking import refinement
+from groundstation.core.library import default_core
+from groundstation.star_tracking import settings as constants
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.evidence import STRAY_RATIO
 from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
-from groundstation.star_tracking.hypotheses import NEIGHBOUR_RANKS, RANK_GROUPS
 from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.search import Found
 from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 
 _ROOM = 128  # spots to begin with; more come seldom
 
 
-class _Rays(Structure):
-    """``gs_rays`` of core/star_tracker.h, where all fields are told; so are those below."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """What a search came to.
 
-    _fields_: ClassVar = [
-        ("table", c_void_p),
-        *((name, c_int64) for name in ("columns", "rows")),
-        *((name, c_double) for name in ("step_px", "picture_rows", "scale_m_px", "reach_m")),
-    ]
+    Attributes:
+        fix: The pose, if one was found and believed.
+        best_nats: Best log likelihood over chance of any pose that was refined.
+        best_guess: That pose.
+        is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
+    """
 
-
-class _Sky(Structure):
-    """``gs_sky``."""
-
-    _fields_: ClassVar = [
-        *((name, c_void_p) for name in ("star", "variance_m2", "is_dropped")),
-        ("stars", c_int64),
-        ("raster", c_void_p),
-        *((name, c_int64) for name in ("columns", "rows")),
-        *(
-            (name, c_double)
-            for name in ("x0_m", "y0_m", "cells_per_m", "area_m2", "density_m2", "tolerance_m")
-        ),
-        *((name, c_void_p) for name in ("key_m", "triangle", "starts")),
-        ("cells", c_int64 * 3),
-        *((name, c_double) for name in ("cell_m", "reach_m")),
-        *((name, c_void_p) for name in ("pair", "pair_length_m")),
-        ("pairs", c_int64),
-    ]
+    fix: StarFix | None
+    best_nats: float
+    best_guess: PoseGuess | None
+    is_ambiguous: bool = False
 
 
-class _Settings(Structure):
-    """``gs_star_settings``."""
-
-    _fields_: ClassVar = [
-        *((name, c_int64) for name in ("min_stars", "min_stars_prior", "identified_spots")),
-        *((name, c_int64) for name in ("pair_spots", "pair_spots_total", "look_ups", "candidates")),
-        *(
-            (name, c_double)
-            for name in ("centre_floor_px", "streak_floor_ratio", "evidence_nats", "rival_nats")
-        ),
-        *((name, c_double) for name in ("exposure_s", "readout_s")),
-        ("sigmas_px", c_void_p),
-        ("sigmas", c_int64),
-        ("stray_ratio", c_double),
-        *((name, c_void_p) for name in ("ranks", "rank_groups")),
-        *((name, c_int64) for name in ("groups", "neighbours", "refine_steps")),
-        *((name, c_double) for name in ("prior_freedom", "clip_sigmas")),
-        *((name, c_double) for name in ("min_streak_px", "min_streak_share", "max_misfit_ratio")),
-        *((name, c_int64) for name in ("min_streaks", "smear_rounds")),
-    ]
-
-
-class _Picture(Structure):
-    """``gs_star_picture``."""
-
-    _fields_: ClassVar = [
-        ("spots", c_int64),
-        *((name, c_void_p) for name in ("u_px", "v_px", "cov_px2", "streak_px")),
-        ("has_prior", c_int64),
-        *((name, c_double) for name in ("prior_x_m", "prior_y_m", "prior_heading_rad")),
-        ("prior_cov", c_double * 9),
-        ("has_motion", c_int64),
-        *((name, c_double) for name in ("vx_table_m_s", "vy_table_m_s", "omega_rad_s")),
-        *((name, c_void_p) for name in ("doubles", "integers")),
-        *((name, c_int64) for name in ("is_fix", "is_tracked", "is_ambiguous", "stars")),
-        *((name, c_double) for name in ("x_m", "y_m", "heading_rad")),
-        ("cov", c_double * 9),
-        *((name, c_double) for name in ("evidence_nats", "best_nats")),
-        ("guess", c_double * 3),
-        *((name, c_void_p) for name in ("spot_index", "star_index", "residual_m")),
-    ]
-
-
-STRUCTURES = (_Rays, _Sky, _Settings, _Picture)
-
-
-class CompiledSearch:
-    """The search in the compiled core; for one thread at a time, since it keeps its buffers.
+class Search:
+    """Finds the pose of enough spots; for one thread at a time, since it keeps its buffers.
 
     Args:
-        core: The compiled core.
         sky: Tables over the catalogue.
         rays: Pixel to ceiling.
         settings: How hard to try.
-        is_dropped: As for ``PureSearch``.
+        is_dropped: Catalogue rows that no spot is matched to, and False for the star that is none, shape
+            (stars + 1,), contiguous; the owner may change it between pictures.
+
+    Raises:
+        CoreError: There is no compiled core.
     """
 
     def __init__(
-        self,
-        core: Core,
-        sky: SkyIndex,
-        rays: CeilingRays,
-        settings: TrackerSettings,
-        is_dropped: NDArray[np.bool_],
+        self, sky: SkyIndex, rays: CeilingRays, settings: TrackerSettings, is_dropped: NDArray[np.bool_]
     ) -> None:
-        self._solve = core.function("gs_star_solve", None, c_void_p, c_void_p, c_void_p, c_void_p)
-        self._doubles = core.function("gs_star_doubles", c_int64, c_int64)
-        self._integers = core.function("gs_star_integers", c_int64, c_int64, c_int64, c_void_p)
-        self._held: list[NDArray[np.generic]] = []  # what the structures point to
+        core = default_core()
+        self._lib, self._ffi = core.lib, core.ffi
+        self._held: list[Any] = []  # pointers that the structures hold, and with them their arrays
         self._stars = len(sky.position_m)
         self._rays = self._rays_of(rays)
         self._sky = self._sky_of(sky, is_dropped)
         self._settings = self._settings_of(settings)
-        self._picture = _Picture()
-        self._cov = np.ctypeslib.as_array(self._picture.cov).reshape(3, 3)
-        self._prior_cov = np.ctypeslib.as_array(self._picture.prior_cov).reshape(3, 3)
-        self._arguments = tuple(byref(s) for s in (self._sky, self._rays, self._settings, self._picture))
+        self._picture = picture = self._ffi.new("StarPicture *")
+        self._cov, self._prior_cov = (
+            np.frombuffer(self._ffi.buffer(field)).reshape(3, 3) for field in (picture.cov, picture.prior_cov)
+        )
         self._make_room(_ROOM)
 
     def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found:
-        """Search one picture, as ``PureSearch.find``."""
+        """Search one picture.
+
+        Args:
+            spots: Brightest first; enough of them for a fix with, or without, a prior.
+            prior: What is believed of the pose.
+            motion: Velocity during the exposure.
+        """
         n, picture = len(spots), self._picture
         if n > self._room:
             self._make_room(2 * n)
@@ -148,7 +97,7 @@ class CompiledSearch:
         if motion is not None:
             picture.vx_table_m_s, picture.vy_table_m_s = motion.vx_table_m_s, motion.vy_table_m_s
             picture.omega_rad_s = motion.omega_rad_s
-        self._solve(*self._arguments)
+        self._lib.gs_star_solve(self._sky, self._rays, self._settings, picture)
         if not picture.is_fix:
             guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
             return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
@@ -174,79 +123,82 @@ class CompiledSearch:
         self._cov_px2, self._streak_px = np.zeros((spots, 3)), np.zeros((spots, 2))
         self._spot_index, self._star_index = np.zeros(spots, np.int32), np.zeros(spots, np.int32)
         self._residual_m = np.zeros((spots, 2))
-        self._scratch = (
-            np.zeros(self._doubles(spots)),
-            np.zeros(self._integers(spots, self._stars, byref(self._settings)), np.int32),
-        )
-        for name in ("u_px", "v_px", "cov_px2", "streak_px", "spot_index", "star_index", "residual_m"):
-            setattr(self._picture, name, getattr(self, f"_{name}").ctypes.data)
-        self._picture.doubles, self._picture.integers = (array.ctypes.data for array in self._scratch)
+        view, new = self._ffi.from_buffer, self._ffi.new
+        buffers = {
+            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("u_px", "v_px")},
+            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("cov_px2", "streak_px")},
+            **{name: view("int32_t[]", getattr(self, f"_{name}")) for name in ("spot_index", "star_index")},
+            "residual_m": view("Point[]", self._residual_m),
+            "doubles": new("double[]", self._lib.gs_star_doubles(spots)),
+            "integers": new("int32_t[]", self._lib.gs_star_integers(spots, self._stars, self._settings)),
+        }
+        for name, buffer in buffers.items():
+            setattr(self._picture, name, buffer)
+        self._buffers = buffers
 
-    def _address(self, array: NDArray[np.generic], kind: type[np.generic]) -> int:
-        """Give the address of an array that lives as long as this object."""
-        held = np.ascontiguousarray(array, dtype=kind)
-        self._held.append(held)
-        return held.ctypes.data
+    def _pointer(self, to: str, array: NDArray[np.generic], kind: type[np.generic]) -> Any:  # noqa: ANN401
+        """Give a pointer to an array that lives as long as this object."""
+        self._held.append(self._ffi.from_buffer(f"{to}[]", np.ascontiguousarray(array, dtype=kind)))
+        return self._held[-1]
 
-    def _rays_of(self, rays: CeilingRays) -> _Rays:
-        return _Rays(
-            table=self._address(rays.table, np.float64),
-            columns=rays.columns,
-            rows=rays.rows,
-            step_px=rays.step_px,
-            picture_rows=rays.camera.height,
-            scale_m_px=rays.scale_m_px,
-            reach_m=rays.reach_m,
-        )
+    def _doubles(self, array: NDArray[np.generic]) -> Any:  # noqa: ANN401
+        return self._pointer("double", array, np.float64)
 
-    def _sky_of(self, sky: SkyIndex, is_dropped: NDArray[np.bool_]) -> _Sky:
+    def _integers(self, array: NDArray[np.generic]) -> Any:  # noqa: ANN401
+        return self._pointer("int32_t", array, np.int32)
+
+    def _rays_of(self, rays: CeilingRays) -> Any:  # noqa: ANN401
+        same = {name: getattr(rays, name) for name in ("columns", "rows", "step_px", "scale_m_px", "reach_m")}
+        made = {"table": self._doubles(rays.table), "picture_rows": rays.camera.height}
+        return self._ffi.new("Rays *", {**same, **made})
+
+    def _sky_of(self, sky: SkyIndex, is_dropped: NDArray[np.bool_]) -> Any:  # noqa: ANN401
         if not is_dropped.flags.c_contiguous:
             raise ValueError("the dropped stars must be one contiguous array, which is read in place")
         triangles, raster = sky.triangles, sky.raster
         rows, columns = raster.star.shape
-        return _Sky(
-            star=self._address(sky.padded_m, np.complex128),
-            variance_m2=self._address(sky.variance_m2, np.float64),
-            is_dropped=self._address(is_dropped, np.bool_),
-            stars=self._stars,
-            raster=self._address(raster.star, np.int32),
-            columns=columns,
-            rows=rows,
-            x0_m=raster.x0_m,
-            y0_m=raster.y0_m,
-            cells_per_m=1.0 / raster.cell_m,
-            area_m2=sky.area_m2,
-            density_m2=sky.density_m2,
-            tolerance_m=sky.tolerance_m,
-            key_m=self._address(triangles.key_m, np.float64),
-            triangle=self._address(triangles.star, np.int32),
-            starts=self._address(triangles.starts, np.int32),
-            cells=triangles.cells,
-            cell_m=triangles.cell_m,
-            reach_m=triangles.reach_m,
-            pair=self._address(sky.pairs, np.int32),
-            pair_length_m=self._address(sky.pair_length_m, np.float64),
-            pairs=len(sky.pairs),
+        return self._ffi.new(
+            "Sky *",
+            {
+                "star": self._pointer("Point", sky.padded_m, np.complex128),
+                "variance_m2": self._doubles(sky.variance_m2),
+                "is_dropped": self._pointer("uint8_t", is_dropped, np.bool_),
+                "stars": self._stars,
+                "raster": self._integers(raster.star),
+                "columns": columns,
+                "rows": rows,
+                "x0_m": raster.x0_m,
+                "y0_m": raster.y0_m,
+                "cells_per_m": 1.0 / raster.cell_m,
+                "area_m2": sky.area_m2,
+                "density_m2": sky.density_m2,
+                "tolerance_m": sky.tolerance_m,
+                "key_m": self._doubles(triangles.key_m),
+                "triangle": self._integers(triangles.star),
+                "starts": self._integers(triangles.starts),
+                "cells": triangles.cells,
+                "cell_m": triangles.cell_m,
+                "reach_m": triangles.reach_m,
+                "pair": self._integers(sky.pairs),
+                "pair_length_m": self._doubles(sky.pair_length_m),
+                "pairs": len(sky.pairs),
+            },
         )
 
-    def _settings_of(self, settings: TrackerSettings) -> _Settings:
-        ranks = np.array(NEIGHBOUR_RANKS)
-        same = {name: getattr(settings, name) for name, *_ in _Settings._fields_ if hasattr(settings, name)}
-        return _Settings(
-            **same,
-            sigmas_px=self._address(np.array(settings.evidence_sigmas_px), np.float64),
-            sigmas=len(settings.evidence_sigmas_px),
-            stray_ratio=STRAY_RATIO,
-            ranks=self._address(ranks, np.int32),
-            rank_groups=self._address(np.array(RANK_GROUPS), np.int32),
-            groups=len(RANK_GROUPS),
-            neighbours=int(ranks.max()) + 2,  # ranks count from 0, and every spot is its own nearest
-            refine_steps=refinement.REFINE_STEPS,
-            prior_freedom=refinement.PRIOR_FREEDOM,
-            clip_sigmas=refinement.CLIP_SIGMAS,
-            min_streak_px=smear.MIN_STREAK_PX,
-            min_streak_share=smear.MIN_STREAK_SHARE,
-            max_misfit_ratio=smear.MAX_MISFIT_RATIO,
-            min_streaks=smear.MIN_STREAKS,
-            smear_rounds=smear.SMEAR_ROUNDS,
-        )
+    def _settings_of(self, settings: TrackerSettings) -> Any:  # noqa: ANN401
+        """Fill in the fields that are named alike, and the arrays."""
+        ranks = np.array(constants.NEIGHBOUR_RANKS)
+        groups, sigmas_px = constants.RANK_GROUPS, settings.evidence_sigmas_px
+        made = {
+            "sigmas_px": self._doubles(np.array(sigmas_px)),
+            "sigmas": len(sigmas_px),
+            "ranks": self._integers(ranks),
+            "rank_groups": self._integers(np.array(groups)),
+            "groups": len(groups),
+            "neighbours": int(ranks.max()) + 2,  # ranks count from 0, and every spot is its own nearest
+        }
+        for name, _ in self._ffi.typeof("SearchSettings").fields:
+            if name not in made:
+                is_setting = hasattr(settings, name)
+                made[name] = getattr(settings, name) if is_setting else getattr(constants, name.upper())
+        return self._ffi.new("SearchSettings *", made)

@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.rays import CeilingPoints
+from groundstation.star_tracking.settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
-
-PRIOR_FREEDOM = 6.0  # a-priori sigmas count like this many residuals when the scale is judged
-CLIP_SIGMAS = 3.0  # of the robust scale; a few bad centres would otherwise rule the error
-REFINE_STEPS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,26 +10,18 @@ matched directly, and lost-in-space is the fallback.
 """
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.star_tracking.compiled_search import Found
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, PoseGuess, PosePrior, StarFix
-from groundstation.star_tracking.hypotheses import (
-    NEIGHBOUR_RANKS,
-    RANK_GROUPS,
-    Poses,
-    pair_poses,
-    spot_triangles,
-    triangle_poses,
-)
+from groundstation.star_tracking.fixes import BodyMotion, PosePrior, StarFix
+from groundstation.star_tracking.hypotheses import Poses, pair_poses, spot_triangles, triangle_poses
 from groundstation.star_tracking.motion import smear_from_streaks, unbend
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
-from groundstation.star_tracking.settings import TrackerSettings
+from groundstation.star_tracking.settings import NEIGHBOUR_RANKS, RANK_GROUPS, TrackerSettings
 from groundstation.star_tracking.settling import Settler, Sighting
 from groundstation.star_tracking.sky_index import SkyIndex
 
@@ -40,29 +32,6 @@ _RIVALS = 16  # so many are looked at for another place that would do as well
 _RIVAL_VOTES_RATIO = 0.8  # of the votes of the fix: with fewer a place is no rival
 _SAME_RAD = 0.03
 _TRIED_M, _TRIED_RAD = 0.05, 0.02  # poses nearer to each other than about this would refine to the same one
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """What a search came to.
-
-    Attributes:
-        fix: The pose, if one was found and believed.
-        best_nats: Best log likelihood over chance of any pose that was refined.
-        best_guess: That pose.
-        is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
-    """
-
-    fix: StarFix | None
-    best_nats: float
-    best_guess: PoseGuess | None
-    is_ambiguous: bool = False
-
-
-class Search(Protocol):
-    """Finds the pose of enough spots; NumPy and the compiled core both do."""
-
-    def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found: ...
 
 
 class PureSearch:
