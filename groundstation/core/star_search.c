@@ -74,7 +74,7 @@ static int is_same(const Ballot *ballot, Point middle, const Candidate *a, const
     return length_of(off) < 4.0 * ballot->sky->tolerance_m && length_of(turn) < 0.03;
 }
 
-/* Settle the poses that most spots agree with, and look for rivals of a fix (PureSearch._best); whether to stop. */
+/* Settle the poses that most spots agree with, and look for rivals of a fix (OracleSearch._best); whether to stop. */
 static int close_ballot(SkySearch *s, Ballot *ballot)
 {
     const double gate_m = 2.5 * s->sky->tolerance_m;

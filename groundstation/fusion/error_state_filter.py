@@ -17,7 +17,6 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
 from groundstation.fusion.carrier import Carrier
-from groundstation.fusion.compiled_reckoner import Reckoner
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S, FirstFixes
@@ -28,6 +27,7 @@ from groundstation.fusion.learned_surface import LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.past_fixes import Past, PastFixes
+from groundstation.fusion.reckoner import Reckoner
 from groundstation.fusion.rests import Rests
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.trace import Carried, Chain, Corrected, Step, Trace

@@ -20,8 +20,7 @@ from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import StarFix
-from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.refinement import spot_covariance
+from groundstation.star_tracking.rays import CeilingRays, spot_covariance
 from groundstation.star_tracking.sky_change import Change, Place, SkyChange
 from groundstation.star_tracking.stray_lights import StrayLights, StraySettings
 from groundstation.star_tracking.view_outline import ViewOutline

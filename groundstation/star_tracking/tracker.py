@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from calibration.camera.models import CameraCalibration
 from calibration.camera.star_catalogue import StarCatalogue
-from groundstation.star_tracking.compiled_search import Found, Search
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
 from groundstation.star_tracking.rays import CeilingRays
+from groundstation.star_tracking.search import Found, Search
 from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 

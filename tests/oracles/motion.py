@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.fixes import BodyMotion
-from groundstation.star_tracking.robust import middle_value
 from groundstation.star_tracking.settings import (
     MAX_MISFIT_RATIO,
     MIN_STREAK_PX,
@@ -24,6 +23,7 @@ from groundstation.star_tracking.settings import (
     MIN_STREAKS,
     SMEAR_ROUNDS,
 )
+from oracles.robust import middle_value
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]

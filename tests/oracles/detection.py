@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.background import WEIGHT_SUM, Levels, measure_levels
 from groundstation.star_tracking.detection import DetectorSettings, Spots
-from groundstation.star_tracking.spot_fit import SpotPixels, fit_spots
+from oracles.background import WEIGHT_SUM, Levels, measure_levels
+from oracles.spot_fit import SpotPixels, fit_spots
 
 _GROW = np.ones((3, 3), np.uint8)
 _MAX_GROUPS = 20_000  # with more of them the picture is flooded
