@@ -80,7 +80,8 @@ class Reckoner:
         lib, ffi = core.lib, core.ffi
         self._lib, self._add = lib, lib.gs_reckoner_add
         # as bytes, all fields of a record at once: ten times as fast as one after the other
-        self._write, self._read = (layout_of(ffi, name) for name in ("ImuPacket", "PlanarState"))
+        self._write = layout_of(ffi, "ImuPacket").pack_into
+        self._read = layout_of(ffi, "PlanarState").unpack_from
         self._events = (
             (lib.WILD, "packet_wild"),
             (lib.HOLE, "packet_hole"),
@@ -88,7 +89,7 @@ class Reckoner:
         )
         self.now = now = ffi.new("Reckoner *")
         self._asked, self._state, self._row, self._hole_row = (
-            memoryview(ffi.buffer(ffi.addressof(now, name))) for name in ("asked", "state", "row", "hole_row")
+            ffi.buffer(ffi.addressof(now, name)) for name in ("asked", "state", "row", "hole_row")
         )
         self._counters = counters
         self._backward = BackwardStamps()
@@ -139,6 +140,10 @@ class Reckoner:
         if self.origin_ns is None:
             self.origin_ns = self.now.origin_ns = self.now.newest_ns = t_ns
 
+    def seconds(self, t_ns: int) -> float:
+        """Return a stamp in s since the origin."""
+        return (t_ns - (self.origin_ns or 0)) * 1e-9
+
     def rest(self, from_s: float, to_s: float) -> None:
         """Say between which moments the vehicle stands still."""
         self.now.rest_from_s, self.now.rest_to_s = from_s, to_s
@@ -159,7 +164,7 @@ class Reckoner:
         if self.origin_ns is None:
             self.start_clock(packet.t_ns - round(packet.dt_s * 1e9))
             self.now.is_restarted = True
-        self._write.pack_into(self._asked, 0, *packet)
+        self._write(self._asked, 0, *packet)
         flags = self._add(self.now)
         if flags and not self._is_taken(flags, packet.t_ns):
             return False
@@ -205,7 +210,7 @@ class Reckoner:
         if self._is_stale:
             self._lib.gs_reckoner_report(self.now)
             self._is_stale = False
-        return PlanarState._make(self._read.unpack_from(self._state))
+        return PlanarState._make(self._read(self._state))
 
     def load(self, x: Array, moved: Array) -> None:
         """Take over a corrected state.

@@ -7,8 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.frames import wrap_angle
-from groundstation.fusion.error_state_filter import WAITS
-from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
+from groundstation.fusion.estimator import WAITS, Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
 from groundstation.messages.base import Message

@@ -66,6 +66,10 @@ class OracleReckoner:
         self._x = es.initial_state(noise).tolist()
         self._unpack()
 
+    def seconds(self, t_ns: int) -> float:
+        """Return a stamp in s since the origin."""
+        return (t_ns - (self.origin_ns or 0)) * 1e-9
+
     def rest(self, from_s: float, to_s: float) -> None:
         """Say between which moments the vehicle stands still."""
         self.rest_from_s, self.rest_to_s = from_s, to_s
@@ -201,6 +205,7 @@ class OracleReckoner:
             x: (23,) biases, slope, scale and lever arm are taken from it.
             moved: (5,) theta, vx, vy, px, py now.
         """
+        self.has_pose = True
         self._x = x.tolist()
         self._theta, self._vx, self._vy, self._px, self._py = moved.tolist()
         self._unpack()

@@ -11,6 +11,7 @@ from oracles.late_fix import OracleLateFix
 from oracles.reckoner import OracleReckoner
 
 from groundstation.core.library import default_core
+from groundstation.fusion import checkpoint, error_state_filter
 from groundstation.fusion import error_state as es
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Counters, Fix, ImuPacket, PlanarState
@@ -117,13 +118,15 @@ def test_records_are_laid_out_as_the_core_declares_them():
         assert tuple(name for name, _ in ffi.typeof(record.__name__).fields) == record._fields
 
 
-def test_the_filter_on_oracles_estimates_the_same():
+def test_the_filter_on_oracles_estimates_the_same(monkeypatch):
     rng = np.random.default_rng(2)
     cov = np.diag([1e-6, 1e-6, 1e-6])
     reports = []
-    filters = [ErrorStateFilter(NOISE), ErrorStateFilter(NOISE)]
-    filters[1]._reckoner = OracleReckoner(NOISE, filters[1].counters)
-    filters[1]._carrier, filters[1]._late_fix = OracleCarrier(NOISE, None), OracleLateFix(NOISE)
+    filters = [ErrorStateFilter(NOISE)]
+    monkeypatch.setattr(error_state_filter, "Reckoner", OracleReckoner)
+    monkeypatch.setattr(checkpoint, "Carrier", OracleCarrier)
+    monkeypatch.setattr(checkpoint, "LateFix", OracleLateFix)
+    filters.append(ErrorStateFilter(NOISE))
     for number in range(1, 1200):
         readings_now = rng.normal(0.0, 1e-3, 3)
         said = [f.add_imu(ImuPacket(number * PERIOD_NS, 0.01, *readings_now, 25.0)) for f in filters]
