@@ -26,7 +26,7 @@ zig: # the C compiler of a machine that has none
 	@echo "There is no C compiler: installing ziglang (once) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements-zig.lock
 
-$(CORE): $(STAMP) groundstation/core/build.py $(wildcard groundstation/core/*.[ch])
+$(CORE): $(STAMP) groundstation/core/build.py groundstation/core/sources.py $(wildcard groundstation/core/*.[ch])
 	@$(BIN)/python tools/build_core.py
 	@touch $(CORE)
 

@@ -18,15 +18,8 @@ if str(_ROOT) not in sys.path:
     sys.path.insert(0, str(_ROOT))  # the package is being built: nothing of it is installed yet
 sys.dont_write_bytecode = True
 
-from groundstation.core.build import (  # noqa: E402
-    INTERFACE,
-    LIBRARY,
-    CoreBuildError,
-    built_folder,
-    compile_core,
-    compiler,
-    is_fresh,
-)
+from groundstation.core.build import CoreBuildError, compile_core, compiler  # noqa: E402
+from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, is_fresh  # noqa: E402
 
 _ZIG_LOCK = _ROOT / "tools" / "requirements-zig.lock"
 

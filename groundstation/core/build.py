@@ -3,7 +3,6 @@
 Needs a C compiler: what ``CC`` names, else ``cc``, else ``ziglang`` from the package index.
 """
 
-import hashlib
 import importlib.util
 import os
 import shlex
@@ -13,15 +12,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-FOLDER = Path(__file__).parent
-LIBRARY, INTERFACE = "_core.so", "_core_interface.py"
-"""What a build consists of: the library, and what cffi read in ``api.h``."""
-# No -march: the library runs on every machine of its kind, and loops that gain by AVX2 carry a clone.
-# No contraction, no fast-math: the same sums in the same order on every machine.
-FLAGS = (
-    *("-std=c11", "-O3", "-fPIC", "-shared", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math"),
-    *("-ffp-contract=off", "-Wall", "-Wextra"),
-)
+from groundstation.core import sources
+from groundstation.core.sources import FLAGS, INTERFACE, LIBRARY
+
 SANITIZERS = (
     "-g",
     "-O1",
@@ -35,37 +28,6 @@ _ZIG = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
 
 class CoreBuildError(RuntimeError):
     """The core could not be compiled; the text says why in one sentence."""
-
-
-def built_folder() -> Path:
-    """Where the build of these sources lies: in an installed package beside them, else in ``build/core``."""
-    root = FOLDER.parents[1]
-    return root / "build" / "core" if (root / "pyproject.toml").exists() else FOLDER
-
-
-def sources() -> list[Path]:
-    """All sources of the core, in a fixed order."""
-    return sorted([*FOLDER.glob("*.c"), *FOLDER.glob("*.h")])
-
-
-def sources_sha256() -> str:
-    """Hash of all sources and flags: what a library must have been made of."""
-    digest = hashlib.sha256(" ".join(FLAGS).encode())
-    for path in sources():
-        content = path.read_bytes()
-        digest.update(f"\n{path.name} {len(content)}\n".encode())
-        digest.update(content)
-    return digest.hexdigest()
-
-
-def is_fresh(folder: Path) -> bool:
-    """Whether a build is there and was made of the present sources."""
-    library = folder / LIBRARY
-    return (
-        (folder / INTERFACE).exists()
-        and library.exists()
-        and sources_sha256().encode() in library.read_bytes()
-    )
 
 
 def compiler() -> tuple[str, ...]:
@@ -95,10 +57,10 @@ def compile_core(folder: Path, extra_flags: tuple[str, ...] = ()) -> Path:
     """
     command = compiler()
     folder.mkdir(parents=True, exist_ok=True)
-    files = [str(path) for path in sources() if path.suffix == ".c"]
+    files = [str(path) for path in sources.sources() if path.suffix == ".c"]
     with tempfile.TemporaryDirectory(dir=folder) as made_in:
         interface, library = Path(made_in, INTERFACE), Path(made_in, LIBRARY)
-        named = f'-DGS_SOURCES="{sources_sha256()}"'
+        named = f'-DGS_SOURCES="{sources.sources_sha256()}"'
         run = subprocess.run(
             [*command, *FLAGS, *extra_flags, named, "-o", str(library), *files, "-lm"],
             # zig keeps what it compiled; here it goes with the folder
@@ -119,7 +81,7 @@ def _read_header(interface: Path) -> None:
     """Write what Python needs to know of ``api.h`` as a module, so that no process has to parse C."""
     from cffi import FFI  # here: who loads a core needs no parser of C
 
-    lines = (FOLDER / "api.h").read_text().splitlines(keepends=True)
+    lines = (sources.FOLDER / "api.h").read_text().splitlines(keepends=True)
     declarations = FFI()
     declarations.set_source(interface.stem, None, compiler_verbose=0)
     declarations.cdef("".join(line for line in lines if not line.startswith("#")))

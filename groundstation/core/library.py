@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.core.build import INTERFACE, LIBRARY, built_folder, sources_sha256
+from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, sources_sha256
 
 
 class CoreError(RuntimeError):

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from oracles.detection import OracleDetector
 
-from groundstation.core.build import LIBRARY, compile_core
+from groundstation.core.build import compile_core
 from groundstation.core.library import load_core
+from groundstation.core.sources import LIBRARY
 from groundstation.star_tracking import detection
 from groundstation.star_tracking.detection import Detector
 

@@ -5,25 +5,26 @@ from pathlib import Path
 import pytest
 
 from groundstation.cli.main import call
-from groundstation.core import build, library
-from groundstation.core.build import CoreBuildError, compile_core, compiler, is_fresh
+from groundstation.core import build, library, sources
+from groundstation.core.build import CoreBuildError, compile_core, compiler
 from groundstation.core.library import CoreError, default_core, load_core
+from groundstation.core.sources import INTERFACE, LIBRARY, is_fresh, sources_sha256
 
 
 @pytest.fixture
 def other_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("core.h", "api.h", "sources.c"):
-        shutil.copy(build.FOLDER / name, tmp_path)
-    monkeypatch.setattr(build, "FOLDER", tmp_path)
+        shutil.copy(sources.FOLDER / name, tmp_path)
+    monkeypatch.setattr(sources, "FOLDER", tmp_path)
     return tmp_path
 
 
 def test_a_library_knows_its_sources(other_sources: Path) -> None:
     made = compile_core(other_sources / "made", ("-Werror",))
-    assert sorted(path.name for path in made.iterdir()) == [build.LIBRARY, build.INTERFACE]
+    assert sorted(path.name for path in made.iterdir()) == [LIBRARY, INTERFACE]
     assert is_fresh(made)
     core = load_core(made)
-    assert core.name == f"core {build.sources_sha256()[:8]}"
+    assert core.name == f"core {sources_sha256()[:8]}"
     assert core.lib.MAX_NODES == 64
     with pytest.raises(AttributeError, match="gs_nothing"):
         _ = core.lib.gs_nothing
@@ -41,10 +42,10 @@ def test_what_is_no_library_is_refused(other_sources: Path) -> None:
     with pytest.raises(CoreError, match="there is no compiled core"):
         load_core(other_sources)
     made = compile_core(other_sources / "made")
-    (made / build.LIBRARY).unlink()
+    (made / LIBRARY).unlink()
     with pytest.raises(CoreError, match="there is no compiled core"):
         load_core(made)
-    (made / build.LIBRARY).write_text("not a library")
+    (made / LIBRARY).write_text("not a library")
     with pytest.raises(CoreError, match="not a core that this machine can load"):
         load_core(made)
 
