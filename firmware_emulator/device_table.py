@@ -16,6 +16,7 @@ from drivers.errors import NotFound
 from drivers.valve_bus.protocol import MAX_VEHICLES
 from firmware_emulator.config import LaboratoryConfig
 from firmware_emulator.device_kind import DeviceKind
+from firmware_emulator.devices.failure_desk import LABORATORY
 from firmware_emulator.devices.imu import IMU
 from firmware_emulator.devices.overhead_camera import OVERHEAD_CAMERA
 from firmware_emulator.devices.pose_streams import FIXES, REFERENCE
@@ -27,6 +28,7 @@ from firmware_emulator.mock_up_config import VehicleConfig
 ENTRY_POINT_GROUP = "firmware_emulator.devices"
 
 OWN: tuple[DeviceKind[Any], ...] = (
+    LABORATORY,  # a failure is there when the devices act at the moment of its beginning
     VALVE_BUS,  # a valve moves before somebody looks
     IMU,
     REFERENCE,
@@ -59,10 +61,17 @@ def device_kinds() -> tuple[DeviceKind[Any], ...]:
 
 
 def failure_kinds(kinds: tuple[DeviceKind[Any], ...]) -> dict[str, FailureKind]:
-    """Every kind of failure: the emulator's own, and those that devices bring."""
+    """Every kind of failure: the emulator's own, and those that devices bring.
+
+    Raises:
+        NotFound: Two of them bear one name.
+    """
     found = dict(FAILURE_KINDS)
     for kind in kinds:
-        found |= kind.failures
+        for name, failure in kind.failures.items():
+            if name in found:
+                raise NotFound(f"device {kind.name!r}: there is another kind of failure {name!r}")
+            found[name] = failure
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.laboratory import Arrival, CameraFrame, ChannelKind
 from firmware_emulator.device_kind import Camera, Device, DeviceKind, PictureOrder, Receiver, Renderer, Runner
-from firmware_emulator.device_table import device_kinds, read_config
+from firmware_emulator.device_table import device_kinds, failure_kinds, read_config
 from firmware_emulator.mock_up import build_mock_ups
 from firmware_emulator.plant.contacts import Contacts, ContactWatch
 from firmware_emulator.scenario import MockUp, Scenario, Site
@@ -68,7 +68,7 @@ class EmulatedLaboratory:
     ) -> None:
         scenario = Scenario(read_config(config), seed, start_ns)
         self.mock_ups: tuple[MockUp, ...] = build_mock_ups(scenario)
-        site = Site(scenario, self.mock_ups)
+        site = Site(scenario, self.mock_ups, failure_kinds(device_kinds()))
         self.installed = tuple(_install(site, is_rendering))
         self._by_channel = {row.channel: row for row in self.installed}
         self._now_ns = start_ns

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware_emulator.config import LaboratoryConfig
-from firmware_emulator.failures import Failures
+from firmware_emulator.failures import FailureKind, Failures
 from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.plant.motion_state import PollGrid
 from firmware_emulator.plant.rigid_body import Vehicle
@@ -100,10 +100,17 @@ class MockUp:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """The laboratory around the mock-ups, for devices that all of them share."""
+    """The laboratory around the mock-ups, for devices that all of them share.
+
+    Attributes:
+        scenario: What it was read from.
+        mock_ups: On the table.
+        failure_kinds: Every kind of failure that can be injected, by name.
+    """
 
     scenario: Scenario
     mock_ups: tuple[MockUp, ...]
+    failure_kinds: Mapping[str, FailureKind]
 
 
 def _words(part: str) -> tuple[int, ...]:

@@ -6,7 +6,6 @@ that prints one `announcement line` on stdout, saying where each of its channels
 then on it is hardware like any other.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,34 +13,23 @@ from importlib.metadata import entry_points
 from typing import Protocol, runtime_checkable
 
 from drivers.errors import NotFound
-from drivers.star_camera.frame import CameraFrame
-from drivers.valve_bus.frame import CanFrame
-
-__all__ = [
-    "ENTRY_POINT_GROUP",
-    "Address",
-    "Arrival",
-    "CameraFrame",
-    "CanFrame",
-    "ChannelKind",
-    "Laboratory",
-    "encode_announcement",
-    "load_laboratory",
-    "parse_announcement",
-]
 
 ENTRY_POINT_GROUP = "groundstation.laboratories"
-
-Address = str | Mapping[str, object]
-"""Where a channel is opened: a device path or URL, or the keyword arguments of its port (CAN)."""
 
 
 class ChannelKind(StrEnum):
     """What travels on a channel, which is the type of `Arrival.data`."""
 
     BYTES = "bytes"
+    """`bytes`: a chunk as one read would return it."""
     CAMERA = "camera"
+    """`drivers.star_camera.frame.CameraFrame`: one picture."""
     CAN = "can"
+    """`drivers.valve_bus.frame.CanFrame`, both ways."""
+    FAILURES = "failures"
+    """`FailureEvent` and `FailureRefused` from the laboratory, `InjectOrder` into it."""
+    POSES = "poses"
+    """`drivers.motion_capture.pose.MotionCapturePose`: one rigid body as one frame of the cameras saw it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,9 +39,8 @@ class Arrival:
     Attributes:
         stamp_ns: Host monotonic clock (virtual in lockstep) at which the last byte was there.
         channel: `<vehicle>/<device>` or a device all vehicles share: `alpha/imu`, `alpha/star_camera`,
-            `alpha/reference`, `valve_bus`.
-        data: What the channel's kind says: a chunk of bytes as one read would return it, one picture, one CAN
-            frame.
+            `alpha/reference`, `valve_bus`. The laboratory's own channel is `laboratory`.
+        data: What the channel's kind says.
     """
 
     stamp_ns: int
@@ -117,40 +104,3 @@ def load_laboratory(name: str, config: Mapping[str, object], seed: int) -> Labor
     if not isinstance(laboratory, Laboratory):
         raise TypeError(f"laboratory {name!r} made a {type(laboratory).__name__}, which is no Laboratory")
     return laboratory
-
-
-def encode_announcement(addresses: Mapping[str, Address]) -> str:
-    r"""One line for stdout: `{"announce": {"alpha/imu": "/dev/pts/3", ...}}`, ended by a newline.
-
-    Args:
-        addresses: Channel to where it is opened: a path or URL, or a table of keyword arguments for the
-            valve bus, such as `{"interface": "slcan", "channel": "socket://127.0.0.1:4000"}`.
-    """
-    return (
-        json.dumps({"announce": {channel: _plain(address) for channel, address in addresses.items()}}) + "\n"
-    )
-
-
-def _plain(address: Address) -> object:
-    return address if isinstance(address, str) else dict(address)
-
-
-def parse_announcement(line: str) -> dict[str, Address] | None:
-    """The addresses of an announcement line; None for any other line, which is log output.
-
-    Raises:
-        ValueError: The line says `announce` but not in the documented form.
-    """
-    try:
-        said = json.loads(line)
-    except ValueError:
-        return None
-    if not isinstance(said, dict) or "announce" not in said:
-        return None
-    addresses = said["announce"]
-    if not isinstance(addresses, dict):
-        raise ValueError(f"an announcement maps channels to addresses, got {type(addresses).__name__}")
-    for channel, address in addresses.items():
-        if not isinstance(address, str | dict):
-            raise ValueError(f"announced address of {channel!r} is neither a text nor a table: {address!r}")
-    return addresses

@@ -29,7 +29,6 @@ class Ailments:
 
     def __init__(self, failures: Failures) -> None:
         self._failures = failures
-        self._is_faulty = failures.has("stuck_gyro") or failures.has("dead_tilt")
         self._channels, self._last_poll = SelfTestChannel(0), 0
         self.held_gyro_code = round(GYRO_NULL)
 
@@ -44,7 +43,7 @@ class Ailments:
 
     def at(self, age_ns: int, window_end: int) -> Disturbances | None:
         """What disturbs the window that ends with poll `window_end`, `age_ns` after power-up."""
-        if not (self._is_faulty or self._channels):
+        if not (self._channels or self._failures.has("stuck_gyro", "dead_tilt")):
             return None
         if window_end > self._last_poll:
             self._channels = SelfTestChannel(0)

@@ -44,7 +44,6 @@ class SerialLine:
         self._latency_ns = round(latency_s * NS_PER_S)
         self._jitter_s = host_jitter_s
         self._failures = failures
-        self._is_faulty = any(failures.has(kind) for kind in ("bit_flips", "lost_bytes", "half_frames"))
         self._rng = rng
         self._start_ns = start_ns
         self.free_ns = start_ns  # when the last bit handed over so far has left
@@ -59,7 +58,7 @@ class SerialLine:
         """Put bytes on the line at `stamp_ns` or when it is free; return when the last bit has left."""
         begin_ns = max(stamp_ns, self.free_ns)
         self.free_ns = begin_ns + round(len(data) * self.byte_ns)
-        if self._is_faulty:
+        if self._failures.has("bit_flips", "lost_bytes", "half_frames"):
             data = self._damage(data, begin_ns)
         self._buffer(data, begin_ns)
         return self.free_ns

@@ -76,7 +76,7 @@ class ValveNode:
         # Nodes do not power up at the same moment: their cycles are spread over the bus.
         self._status_ns = start_ns + STATUS_NS + index * 1_300_000
         self._slow_ns = start_ns + SLOW_NS + index * 1_300_000 + 600_000
-        self._failure_edges_ns = deque(start_ns + edge_ns for edge_ns in failures.edges_ns("valves"))
+        failures.watch("valves", self._set_valve_failures)
         self._is_armed = self._is_stopped = self._is_dead_man_closed = False
         self._is_air_on = vehicle.is_floating
         self._last_counter: int | None = None
@@ -91,7 +91,7 @@ class ValveNode:
             next_ns = min(next_ns, *self._off_ns.values())
         if self._inbox:
             next_ns = min(next_ns, self._inbox[0][0])
-        return min(next_ns, self._failure_edges_ns[0]) if self._failure_edges_ns else next_ns
+        return next_ns
 
     @property
     def next_output_ns(self) -> int:
@@ -109,9 +109,6 @@ class ValveNode:
 
     def run(self, now_ns: int) -> None:
         """Do what is due at `now_ns`: time-outs first, then what was heard, then speak."""
-        while self._failure_edges_ns and self._failure_edges_ns[0] <= now_ns:
-            self._failure_edges_ns.popleft()
-            self._set_valve_failures(now_ns)
         for valve in [valve for valve, off_ns in self._off_ns.items() if off_ns <= now_ns]:
             self._close([valve], now_ns)
         if self._dead_man_ns <= now_ns:

@@ -1,13 +1,14 @@
 """Contract of the failure table: every row acts, from its start and not before."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
 from drivers.valve_bus.protocol import Arm, ValveCommand, encode
-from firmware_emulator.failures import FAILURE_KINDS, FailureConfig, Failures
+from firmware_emulator.failures import FAILURE_KINDS, Failure, FailureConfig, Failures
 from firmware_emulator.laboratory import EmulatedLaboratory
 
 MS = 1_000_000
@@ -71,7 +72,7 @@ def said(arrivals, until_ns=None):
     return [
         (a.stamp_ns, a.channel, a.data.image.tobytes() if hasattr(a.data, "image") else repr(a.data))
         for a in arrivals
-        if until_ns is None or a.stamp_ns < until_ns
+        if a.channel != "laboratory" and (until_ns is None or a.stamp_ns < until_ns)
     ]
 
 
@@ -97,8 +98,8 @@ def test_camera_failures_act_on_drawn_fixes_too(scene, kind):
 
 @pytest.mark.parametrize("kind", FAILURE_KINDS)
 def test_every_parameter_may_be_given_and_no_other(kind):
-    row = FAILURE_KINDS[kind]
-    FailureConfig(kind=kind, vehicle="alpha", parameters=dict(row.parameters))
+    defaults = {name: parameter.default for name, parameter in FAILURE_KINDS[kind].parameters.items()}
+    FailureConfig(kind=kind, vehicle="alpha", parameters=defaults)
     with pytest.raises(ValidationError, match="has no parameter 'sorcery'"):
         FailureConfig(kind=kind, vehicle="alpha", parameters={"sorcery": 1.0})
 
@@ -117,13 +118,63 @@ def test_a_failure_that_ends_before_it_starts_is_refused():
         FailureConfig(kind="dead_sky", vehicle="alpha", start_s=5.0, end_s=4.0)
 
 
-def test_edges_are_those_of_the_device_asked_for():
+@pytest.mark.parametrize(
+    ("kind", "parameters", "complaint"),
+    [
+        ("leaking_valve", {"valve": 1.5}, "valve .* must be a whole number, got 1.5"),
+        ("leaking_valve", {"fraction": math.nan}, "fraction .* must lie in 0..1, got nan"),
+        ("leaking_valve", {"fraction": 1.2}, "fraction .* must lie in 0..1, got 1.2"),
+        ("bit_flips", {"probability_per_bit": -0.1}, "probability_per_bit .* must lie in 0..1"),
+        ("dead_star", {"star": -1}, r"star .* must lie in 0\.\.99999"),
+        ("new_star", {"x_m": math.inf}, "x_m .* must lie in"),
+        ("stuck_gyro", {"code": 5000}, r"code .* must lie in 0\.\.4095"),
+        ("false_lights", {"count": 2.5}, "count .* whole number"),
+    ],
+)
+def test_an_impossible_value_is_refused(kind, parameters, complaint):
+    with pytest.raises(ValidationError, match=complaint):
+        FailureConfig(kind=kind, vehicle="alpha", parameters=parameters)
+
+
+def test_an_end_that_is_no_number_is_refused():
+    with pytest.raises(ValidationError, match="ends"):
+        FailureConfig(kind="dead_sky", vehicle="alpha", end_s=math.nan)
+
+
+def test_the_older_name_of_the_key_is_still_read():
+    row = {"kind": "dead_sky", "vehicle": "alpha", "start_s": 0.5}
+    arrivals = EmulatedLaboratory({"vehicles": [{"name": "alpha"}], "faults": [row]}).advance(S)
+    assert [a.stamp_ns for a in arrivals if a.channel == "laboratory"] == [S // 2]
+
+
+def test_failures_of_a_vehicle_are_filled_in_and_its_own():
     rows = [
         FailureConfig(kind="dead_sky", vehicle="alpha", start_s=1.0, end_s=2.0),
         FailureConfig(kind="leaking_valve", vehicle="alpha", start_s=3.0),
         FailureConfig(kind="leaking_valve", vehicle="beta", start_s=4.0),
     ]
     failures = Failures.of_vehicle(rows, "alpha")
-    assert failures.edges_ns("valves") == [3 * S]
-    assert failures.edges_ns("camera") == [S, 2 * S]
+    assert [(f.kind, f.start_ns, f.end_ns) for f in failures.all()] == [
+        ("dead_sky", S, 2 * S),
+        ("leaking_valve", 3 * S, None),
+    ]
+    assert failures.active("dead_sky", 2 * S) is None
     assert failures.active("leaking_valve", 4 * S).parameters == {"valve": 0.0, "fraction": 0.1}
+
+
+def test_only_those_who_watch_a_device_learn_of_its_failures():
+    failures = Failures()
+    calls = []
+    failures.watch("valves", calls.append)
+    failures.report("camera", 1)
+    failures.report("valves", 2)
+    assert calls == [2]
+
+
+def test_failures_that_ended_long_ago_are_forgotten():
+    failures = Failures()
+    for minute in range(100):
+        start_ns = minute * 60 * S
+        failures.add(Failure("dead_sky", start_ns, start_ns + S, {}))
+    assert len(failures.all()) == 2
+    assert failures.active("dead_sky", 99 * 60 * S)

@@ -82,6 +82,7 @@ def test_it_is_a_laboratory_with_documented_channels():
     laboratory = EmulatedLaboratory(scenario(2), seed=1)
     assert isinstance(laboratory, Laboratory)
     assert laboratory.channels() == {
+        "laboratory": ChannelKind.FAILURES,
         "valve_bus": ChannelKind.CAN,
         **{
             f"{name}/{device}": ChannelKind.BYTES

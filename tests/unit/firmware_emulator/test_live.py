@@ -153,7 +153,7 @@ def start(tmp_path, text):
 def test_the_process_announces_its_ports_and_leaves_none_behind(tmp_path, ending):
     with start(tmp_path, '[[laboratory.vehicles]]\nname = "alpha"\n') as process:
         addresses = parse_announcement(process.stdout.readline())
-        assert set(addresses) == {"valve_bus", "alpha/imu", "alpha/reference", "alpha/fixes"}
+        assert set(addresses) == {"laboratory", "valve_bus", "alpha/imu", "alpha/reference", "alpha/fixes"}
         pty = Path(addresses["alpha/imu"])
         assert pty.exists()
         if ending == "terminate":
