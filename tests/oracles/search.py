@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.camera.models import CameraCalibration
-from calibration.camera.star_catalogue import StarCatalogue
+from groundstation.star_tracking.camera_model import CameraCalibration
+from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, PosePrior, StarFix
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
