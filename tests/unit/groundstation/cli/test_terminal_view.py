@@ -71,6 +71,20 @@ def test_everything_is_shown(full):
         assert any(stage in line and ages in line for line in lines), stage
 
 
+def test_what_changes_is_drawn_again(full):
+    screen = io.StringIO()
+    view = TerminalView(full, Console(file=screen, width=120, height=50, force_terminal=True))
+    with view.opened(headless=False):
+        full.launcher.children[1].state = "ready"
+        full.monitor.health.take(Diagnostics(0, "alpha", "alpha/imu", 2, "alpha/imu: gone", (), ()))
+        before = len(screen.getvalue())
+        view.refresh()
+        again = screen.getvalue()[before:]
+    assert "gone" in again
+    assert "starting" not in again
+    assert "5.0 / 10.0" in again
+
+
 @pytest.mark.parametrize("size", [(80, 24), (40, 10), (200, 60)])
 @pytest.mark.parametrize("vehicles", [VEHICLES[:1], VEHICLES])
 def test_terminals_of_any_size_are_drawn_on(size, vehicles):
