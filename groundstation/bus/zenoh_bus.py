@@ -34,6 +34,7 @@ def _config(mode: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...]
         "mode": mode,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "scouting/delay": 0,  # else opening the hub takes half a second of waiting for nobody
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "transport/shared_memory/enabled": False,

@@ -22,7 +22,7 @@ import struct
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
@@ -98,7 +98,7 @@ class ForkServer:
     """The launcher's side of the server.
 
     Args:
-        modules: What a server of its own interpreter loads before it forks.
+        modules: What the server loads before it forks.
 
     Attributes:
         pid: Of the server; None before ``start``.
@@ -221,8 +221,6 @@ class ForkServer:
         self.pid = self._popen.pid
 
     def _fork_ourselves(self, theirs: socket.socket) -> None:
-        for module in self._modules:
-            importlib.import_module(module)
         sys.stdout.flush()
         sys.stderr.flush()
         gc.collect()
@@ -232,7 +230,7 @@ class ForkServer:
             code = 1
             try:
                 os.setsid()
-                _serve(theirs)
+                _serve(theirs, self._modules)
                 code = 0
             except BaseException:  # whatever it is, it must not return into the launcher's code
                 traceback.print_exc()
@@ -252,8 +250,8 @@ def _has_threads() -> bool:
     return len(list(Path("/proc/self/task").iterdir())) > 1
 
 
-def _serve(requests: socket.socket) -> None:
-    """Fork what is asked for, until the other end is closed."""
+def _serve(requests: socket.socket, modules: Iterable[str]) -> None:
+    """Load modules, then fork what is asked for, until the other end is closed."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -263,6 +261,10 @@ def _serve(requests: socket.socket) -> None:
     os.dup2(nothing, 1)
     os.close(nothing)
     _set_name("fork_server")
+    for module in modules:
+        importlib.import_module(module)
+    gc.collect()
+    gc.freeze()
     while True:
         asked, descriptors, _, _ = socket.recv_fds(requests, 1, 3)
         if not asked:
@@ -303,8 +305,7 @@ def _become(request: int, stdin: int, stderr: int) -> None:
     os.dup2(stdin, 0)
     os.dup2(stderr, 1)
     os.dup2(stderr, 2)
-    with open(f"/proc/self/fd/{request}", "rb") as file:  # by this name it is read from its beginning
-        pickled = file.read()
+    pickled = Path(f"/proc/self/fd/{request}").read_bytes()  # by this name it is read from its beginning
     _close_but(None)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115 the old one may have read ahead
     sys.stdout = sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115 open to the end
@@ -336,12 +337,7 @@ def _set_name(name: str) -> None:
 
 def main() -> None:
     """Serve as an interpreter of its own: number of the socket, then the modules to load."""
-    requests = socket.socket(fileno=int(sys.argv[1]))
-    for module in sys.argv[2:]:
-        importlib.import_module(module)
-    gc.collect()
-    gc.freeze()
-    _serve(requests)
+    _serve(socket.socket(fileno=int(sys.argv[1])), sys.argv[2:])
 
 
 if __name__ == "__main__":

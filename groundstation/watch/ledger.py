@@ -49,7 +49,7 @@ _PASSED_ON: Mapping[str, type[Message]] = {
 FOLLOWED: Mapping[str, type[Message]] = {**_READ, **_PASSED_ON}
 """Classes that the ledger wants, by their nouns; it passes over all others."""
 
-_SPOTS, _IMU, _STATE = StarSpots.TOPIC.noun, Imu.TOPIC.noun, VehicleState.TOPIC.noun
+_SPOTS, _STATE = StarSpots.TOPIC.noun, VehicleState.TOPIC.noun
 _SAMPLES = 2000
 _ORIGINS = 16384
 _WAITING = 4096
@@ -157,13 +157,13 @@ class Ledger:
             vehicle.reach("exposure", payload.stamp_ns, payload.stamp_ns)
             if payload.fix:
                 vehicle.reach("fix", payload.stamp_ns, publish_ns)
-            if causes and causes[0].noun == _SPOTS:
+            if causes:
                 self._learn(causes[0], payload.stamp_ns)
         elif isinstance(payload, VehicleState):
             if payload.fix_stamp_ns:
                 self._vehicle(key.owner).reach("state", payload.fix_stamp_ns, publish_ns)
             self._learn(key, payload.fix_stamp_ns)
-            if causes and causes[0].noun == _IMU:
+            if causes:
                 self._await(causes[0], _Link(key, publish_ns))
 
     def _pass_on(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...]) -> None:

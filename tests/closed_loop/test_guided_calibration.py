@@ -4,16 +4,15 @@ import pytest
 
 from calibration.imu.guided import GuidedSequence
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
 from groundstation.cli import calibrate_guided
 from groundstation.cli.calibrate_flight import constants, widened
-from groundstation.fusion.offline import OfflineSmoother
 from groundstation.declarations.request import Ack, Request
+from groundstation.fusion.offline import OfflineSmoother
+from groundstation.parts.fusion.estimation import fix_floors_of, rig_noise
+from groundstation.parts.fusion.fusion import Fusion
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.stars.messages import StarFix
 from groundstation.parts.valves.messages import ValveStatus
-from groundstation.parts.fusion.fusion import Fusion
-from groundstation.parts.fusion.estimation import fix_floors_of, rig_noise
 
 LONGEST_S = 400
 SCALE_ERROR = 0.012
@@ -48,7 +47,7 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly, mon
     for second in range(LONGEST_S):
         flight.run(1.0)
         said = sorted(
-            (payload for kind in (Imu, StarFix, ValveStatus) for payload in flight.said[kind]),
+            (payload for kind in (Imu, StarFix, ValveStatus) for payload in flight.published[kind]),
             key=lambda payload: payload.stamp_ns,
         )
         for payload in said:
@@ -57,7 +56,7 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly, mon
             watch.hear(f"alpha/{topic.noun}", topic.codec.encode(payload), b"")
             watch.work(0.0)
         for kind in (Imu, StarFix, ValveStatus):
-            flight.said[kind].clear()
+            flight.published[kind].clear()
         advice = sequence.update(float(second), watch.known())
         if advice.step is None:
             break

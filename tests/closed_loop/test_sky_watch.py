@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
+from groundstation.declarations.errors import UsageError
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.stars.messages import SkyChange, StarFix
-from groundstation.runners.lockstep_run import run_lockstep
 from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
@@ -84,7 +84,7 @@ def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
     text += fault("moved_star", 0.0, star=moved[0], dx_m=SHIFT_M[0], dy_m=SHIFT_M[1])
     rig_path, recording, out = tmp_path / "rig.toml", tmp_path / "run.mcap", tmp_path / "amended.csv"
     rig_path.write_text(text)
-    run_lockstep(parse_rig(text, rig_path), rig_path, recording, 4.5, 3, lambda *_: None)
+    run_lockstep(parse_rig(text, rig_path), text, rig_path, recording, 4.5, 3, lambda *_: None)
     call = ["amend", str(CEILING), str(recording), "--out", str(out)]
     result = CliRunner().invoke(app, call, catch_exceptions=False)
     assert f"star {dead[1]}: struck off" in result.stdout

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
-from groundstation.cli.table_map_flights import read_source
+from calibration.table.smoothed_flights import read_source
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.messages import FusionCalibration

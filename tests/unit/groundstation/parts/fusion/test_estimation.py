@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.runtime.node_table import check_rig
 
 from calibration.result import CalibrationResult, Provenance, Quantity
+from groundstation.declarations.errors import RigError
 from groundstation.fusion import error_state as es
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.declarations.errors import RigError
 from groundstation.parts.fusion.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
-from groundstation.runtime.node_table import check_rig
 from groundstation.rig.provenance import calibration_hashes
 from groundstation.rig.read import parse_rig
 
@@ -96,10 +96,10 @@ def test_constants_of_files_are_weighed_against_the_rigs(tmp_path):
 @pytest.mark.parametrize(
     ("table", "imu", "said"),
     [
-        ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml cannot be read"),
-        ('map = "torn.toml"', "", r"table\.map: .*torn\.toml is not valid TOML"),
+        ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml: cannot be read"),
+        ('map = "torn.toml"', "", r"table\.map: .*torn\.toml: is not valid TOML"),
         ('map = "joint.toml"', "", r"table\.map: .*joint\.toml: key grid is missing"),
-        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration: .*nowhere\.toml cannot be read"),
+        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration: .*nowhere\.toml: cannot be read"),
         ("", 'calibration = ["rest.toml"]', r"rest\.toml holds no constant that lasts"),
         ("", 'calibration = ["unit.toml"]', r"unit\.toml: lever_x must be in the unit 'm', found 'mm'"),
     ],
