@@ -78,7 +78,7 @@ class TableSection(Section):
         if self.map is None:
             return None
         try:
-            return slope_grid(self.map.value(TableMap.load))
+            return slope_grid(self.map.value(TableMap.parse))
         except TableMapError as error:
             raise ValueError(f"table.map: {error}") from error
 
