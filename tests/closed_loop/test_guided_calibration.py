@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibration import wizard
+from calibration import wizards
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.topics import topic_of
 from groundstation.messages import definitions as m
@@ -28,9 +28,9 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly, mon
         flight.runner._publish([Delivered(Envelope(topic_of(m.Request), "test", number, now_ns), request)])
 
     clock_ns = [0]
-    monkeypatch.setattr(wizard, "monotonic_ns", lambda: clock_ns[0])
-    guide = wizard.load_wizard("imu").begin(flight.rig, "alpha")
-    inbox = wizard._Inbox(guide)
+    monkeypatch.setattr(wizards, "monotonic_ns", lambda: clock_ns[0])
+    guide = wizards.load_wizard("imu").begin(flight.rig, "alpha")
+    inbox = wizards._Inbox(guide)
     for second in range(LONGEST_S):
         flight.run(1.0)
         said = sorted(
