@@ -23,7 +23,7 @@ def imu(
     vehicle: Vehicle = None,
     drive: Drive = False,
 ) -> None:
-    """IMU of a running vehicle, step by step: rest, turns, flights; it says when there is enough data.
+    """IMU of a running vehicle, step by step: rest, turns, flights, until there is enough data.
 
     Example: groundstation calibrate imu examples/rigs/published.toml --guided --drive --out imu.toml
     """
