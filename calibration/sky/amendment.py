@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.outcome import CalibrationRefusedError
 from groundstation.star_tracking.sky_change import Change, SkyChange
 
 SAME_LIGHT_M = 0.015
 """Two findings so near to each other are of one light."""
 
 
-class AmendmentError(ValueError):
+class AmendmentError(CalibrationRefusedError):
     """The findings are not about this star list; the message is one sentence."""
 
 

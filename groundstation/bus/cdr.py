@@ -10,8 +10,8 @@ import struct
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from groundstation.declarations.message import Message
 from groundstation.bus.cdr_fields import Part, Run, parts, ros_fields
+from groundstation.declarations.message import Message
 
 __all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields"]
 
@@ -94,6 +94,12 @@ class Codec(Generic[M]):
 
 
 @functools.cache
+def _compiled(cls: Any) -> Any:  # noqa: ANN401 - a class is hashable, which mypy doubts
+    return Codec(cls)
+
+
 def codec_of(cls: type[M]) -> Codec[M]:
     """The codec of a class, compiled at the first call."""
-    return Codec(cls)
+    kind: Any = cls
+    found: Codec[M] = _compiled(kind)
+    return found

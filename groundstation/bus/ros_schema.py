@@ -10,8 +10,8 @@ definitions is that of the MCAP registry's ``ros2msg`` schema encoding.
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from groundstation.declarations.message import Message
 from groundstation.bus.cdr import ros_fields
+from groundstation.declarations.message import Message
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

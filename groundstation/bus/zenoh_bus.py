@@ -34,6 +34,7 @@ def _config(mode: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...]
         "mode": mode,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "scouting/delay": 0,  # else opening the hub takes half a second of waiting for nobody
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "transport/shared_memory/enabled": False,
@@ -80,7 +81,7 @@ class TopicPublisher:
         )
         self.is_wanted = always
         self._listener = None if always else self._publisher.declare_matching_listener(self._match)
-        if self._listener is not None and self._publisher.matching_status.matching:
+        if self._listener is not None and self._publisher.matching_status:
             self.is_wanted = True
 
     def _match(self, status: zenoh.MatchingStatus) -> None:

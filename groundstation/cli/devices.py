@@ -11,8 +11,9 @@ from rich.table import Table
 from serial.tools import list_ports
 
 from drivers.imu_block.identify import BAUDS, LISTEN_S, PortReport, ask_url
-from groundstation.cli.errors import UsageError
-from groundstation.runtime.rig import load_rig
+from groundstation.declarations.errors import UsageError
+from groundstation.parts.imu.sections import ImuOfVehicle
+from groundstation.rig.read import load_rig
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -67,8 +68,9 @@ def _owners(rig: Path | None) -> dict[int, str]:
     """Mock-ups by the serial number of their IMU block."""
     if rig is None:
         return {}
-    vehicles = load_rig(rig).vehicles
-    return {v.imu_serial_number: name for name, v in vehicles.items() if v.imu_serial_number is not None}
+    loaded = load_rig(rig)
+    numbers = {name: loaded.vehicle(name, ImuOfVehicle).imu_serial_number for name in loaded.vehicles}
+    return {number: name for name, number in numbers.items() if number is not None}
 
 
 def _owner(report: PortReport, owners: dict[int, str]) -> str | None:

@@ -9,10 +9,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from groundstation.bus.topics import topic_named
+from groundstation.bus.envelope import Cause
 from groundstation.cli import recording_pictures
-from groundstation.cli.errors import UsageError
-from groundstation.recording.causes import CauseIndex, Reference
+from groundstation.declarations.errors import UsageError
+from groundstation.recording.causes import CauseIndex
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
@@ -71,13 +71,11 @@ def causes(
 
     Example: groundstation recording causes run.mcap alpha valve_command 1000
     """
-    try:
-        row = topic_named(topic)
-    except KeyError:
-        raise UsageError(f"no topic is called {topic!r}; `groundstation recording info` lists them") from None
     with Recording(file) as found:
+        if topic not in {channel.noun for channel in found.channels}:
+            raise UsageError(f"no topic is called {topic!r}; `groundstation recording info` lists them")
         index = CauseIndex(found)
-    wanted = Reference(row.index, vehicle, sequence)
+    wanted = Cause(topic, vehicle, sequence)
     told_ns = index[wanted].told_ns
     table = Table(box=None, pad_edge=False)
     for heading, width in (("back", 4), ("message", 24), ("number", 6), ("made by", 21)):
@@ -86,7 +84,7 @@ def causes(
     table.add_column("took / ms", justify="right")
     for steps, origin in index.chain(wanted):
         reference = origin.message
-        name = f"{reference.owner}/{reference.topic.noun}".removeprefix("/")
+        name = f"{reference.owner}/{reference.noun}".removeprefix("/")
         age_ms, took_ms = (told_ns - origin.told_ns) * 1e-6, origin.wall_ns * 1e-6
         made_by = origin.node or "a port"
         table.add_row(
@@ -124,7 +122,7 @@ def _print_info(found: Recording) -> None:
     table = Table("topic", "of", "messages", "rate / Hz", box=None, pad_edge=False)
     for channel in found.channels:
         rate_hz = f"{(channel.count - 1) / span_s:.1f}" if span_s > 0 and channel.count > 1 else ""
-        table.add_row(channel.topic.noun, channel.owner, str(channel.count), rate_hz)
+        table.add_row(channel.noun, channel.owner, str(channel.count), rate_hz)
     Console().print(table)
 
 

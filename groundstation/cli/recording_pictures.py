@@ -10,11 +10,11 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.bus.topics import topic_of
-from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import whole_folder, write_picture
-from groundstation.messages.definitions import StarMatches, StarPicture
-from groundstation.nodes.star_answers import notes_of
+from groundstation.declarations.errors import UsageError
+from groundstation.files.png import write_png
+from groundstation.files.writing import whole_folder
+from groundstation.parts.stars.messages import StarMatches, StarPicture
+from groundstation.parts.stars.star_answers import notes_of
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.star_tracking.picture_drawing import draw_notes
@@ -27,7 +27,7 @@ class ExplainedPicture:
 
     Attributes:
         vehicle: Whose camera.
-        stamp_ns: Middle of the exposure.
+        stamp_ns: Arrival of the picture.
         image: Grey, uint8 (h, w), as the camera gave it.
         notes: Which light is what.
         reason: Why there was no fix; empty for a fix.
@@ -47,7 +47,7 @@ def explained_pictures(recording: Recording) -> Iterator[ExplainedPicture]:
         RecordingError: The file cannot be read.
     """
     halves: dict[tuple[str, int], StarMatches | StarPicture] = {}
-    for message in recording.messages({topic_of(StarMatches), topic_of(StarPicture)}):
+    for message in recording.messages([StarMatches, StarPicture]):
         payload = message.payload
         key = (payload.vehicle, payload.stamp_ns)
         assert isinstance(payload, StarMatches | StarPicture)
@@ -82,9 +82,9 @@ def pictures(
                 name = f"{found.vehicle}_{since_s:09.3f}s"
                 verdict = found.reason or "fix"
                 caption = f"{found.vehicle}, {since_s:.3f} s: {verdict}"
-                write_picture(folder / f"{name}.png", draw_notes(found.image, found.notes, caption))
+                write_png(folder / f"{name}.png", draw_notes(found.image, found.notes, caption))
                 if raw:
-                    write_picture(folder / f"{name}_raw.png", found.image)
+                    write_png(folder / f"{name}_raw.png", found.image)
                 print(f"{name}.png: {verdict}")
                 count += 1
             policy = recording.info.images.value

@@ -9,20 +9,22 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from groundstation.cli.errors import UsageError
-from groundstation.files.errors import CalibrationFileError
-from groundstation.nodes.node import Node
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.node import Node
+from groundstation.declarations.rig import Rig
+from groundstation.files.errors import FileError
+from groundstation.parts.table import installed_tables
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.software import software
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.node_table import make_node
-from groundstation.runtime.provenance import calibration_hashes
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.replay_comparison import EXACT, Tolerances, load_tolerances
-from groundstation.runtime.replay_report import ReplayReport
-from groundstation.runtime.rig import Rig, parse_rig
+from groundstation.rig.plan import make_node
+from groundstation.rig.provenance import file_hashes
+from groundstation.rig.read import parse_rig
+from groundstation.runners.replay import ReplayRunner
+from groundstation.runners.replay_comparison import EXACT, Tolerances, load_tolerances
+from groundstation.runners.replay_report import ReplayReport
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -38,19 +40,19 @@ def replay(
         list[str] | None,
         typer.Option(help="Node to replay, e.g. alpha/fusion; may be repeated. Default: all."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write what the nodes say now (.mcap).")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write what the nodes publish now (.mcap).")] = None,
     rig: Annotated[Path | None, typer.Option(help="Rig file to use instead of the recorded one.")] = None,
     tolerances: Annotated[
         Path | None, typer.Option(help="TOML of differences to forgive; without it every bit counts.")
     ] = None,
 ) -> None:
-    """Feed a recording through the nodes again and compare what they say with what they said.
+    """Feed a recording through the nodes again and compare what they publish with what they published.
 
     Exit code 0 if all agrees, 1 if something differs.
 
     Example: groundstation replay run.mcap --node alpha/fusion --out fusion.mcap
     """
-    allowed = EXACT if tolerances is None else load_tolerances(tolerances)
+    allowed = EXACT if tolerances is None else load_tolerances(tolerances, installed_tables().payloads)
     try:
         with Recording(recording) as found:
             report = _replay(found, node, out, rig, allowed)
@@ -65,7 +67,7 @@ def _replay(
     found: Recording, nodes: list[str] | None, out: Path | None, rig_path: Path | None, allowed: Tolerances
 ) -> ReplayReport:
     info, rig = _rig_of(found, rig_path)
-    for name, digest in calibration_hashes(rig).items():
+    for name, digest in file_hashes(rig).items():
         if found.info.calibration_sha256.get(name, digest) != digest:
             print(f"calibration {name} is not the one of the recording")
     if info.software not in ("", software()):
@@ -100,9 +102,7 @@ def _factory(rig: Rig) -> Callable[[str], Node]:
     def make(key: str) -> Node:
         try:
             return make_node(rig, key)
-        except KeyError:
-            raise UsageError(f"the rig {rig.name!r} has no node {key!r}") from None
-        except CalibrationFileError as error:
+        except FileError as error:
             raise UsageError(f"{key} cannot be made: {error}") from error
 
     return make

@@ -8,9 +8,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.recording.errors import RecordingError
-from groundstation.runtime.report import write_report
+from groundstation.watch.report import write_report
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -6,15 +6,11 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.errors import UsageError
-from groundstation.nodes.actions import ACTIONS
-from groundstation.runtime.asking import ask
-from groundstation.runtime.running import RunningRig, find_running
-
-_ACTIONS = "\n\n".join(
-    " ".join([name, *(argument.replace("_rad", "_deg") for argument in row.arguments)]) + f": {row.summary}"
-    for name, row in ACTIONS.items()
-)
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.request import Action, Argument, ArgumentError
+from groundstation.launch.asking import ask
+from groundstation.launch.running import choose_run
+from groundstation.parts.table import installed_tables
 
 # "-0.2" is a number and no option
 _NUMBERS = {"ignore_unknown_options": True}
@@ -22,14 +18,21 @@ _NUMBERS = {"ignore_unknown_options": True}
 app = typer.Typer(rich_markup_mode=None)
 
 
+def _described() -> str:
+    rows = installed_tables().actions.values()
+    return "\n\n".join(" ".join([row.name, *map(_shown, row.arguments)]) + f": {row.summary}" for row in rows)
+
+
 @app.command(
     context_settings=_NUMBERS,
-    epilog=f"Actions and their numbers:\n\n{_ACTIONS}",
+    epilog=f"Actions and their arguments:\n\n{_described()}",
 )
 def request(
     vehicle: Annotated[str, typer.Argument(help="Name of the vehicle, as in the rig file.")],
     action: Annotated[str, typer.Argument(help="What it is to do.")],
-    numbers: Annotated[list[float] | None, typer.Argument(help="Metres, and degrees.")] = None,
+    arguments: Annotated[
+        list[str] | None, typer.Argument(help="In their order, or as name=value; metres, and degrees.")
+    ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1)] = 3.0,
     pid: Annotated[int | None, typer.Option(help="Process of the run, where several are going on.")] = None,
 ) -> None:
@@ -39,40 +42,52 @@ def request(
 
     Example: groundstation request alpha go_to 0.2 0.1 90
     """
-    row = ACTIONS.get(action)
+    actions = installed_tables().actions
+    row = actions.get(action)
     if row is None:
-        raise UsageError(f"there is no action {action!r} (there are {', '.join(ACTIONS)})")
-    said = tuple(numbers or ())
-    if len(said) != len(row.arguments):
-        wanted = " ".join(name.replace("_rad", "_deg") for name in row.arguments) or "no numbers"
-        raise UsageError(f"{action} takes {wanted}, found {len(said)} numbers")
-    if not all(math.isfinite(number) for number in said):
-        raise UsageError(f"{action} takes finite numbers, found {' '.join(map(str, said))}")
-    arguments = tuple(
-        math.radians(number) if name.endswith("_rad") else number
-        for name, number in zip(row.arguments, said, strict=True)
-    )
-    run = _choose(find_running(), vehicle, pid)
-    ack = ask(run.endpoint, vehicle, action, arguments, getpass.getuser(), timeout)
-    words = " ".join([action, *(f"{number:g}" for number in said)])
+        raise UsageError(f"there is no action {action!r} (there are {', '.join(actions)})")
+    words = arguments or []
+    try:
+        given = row.check(_values(row, words))
+    except ArgumentError as error:
+        raise UsageError(str(error)) from error
+    run = choose_run(vehicle, pid)
+    ack = ask(run.endpoint, vehicle, action, given, getpass.getuser(), timeout)
+    asked = " ".join([action, *words])
     verdict = "accepted" if ack.accepted else f"refused: {ack.reason}"
-    print(f"{vehicle} ({run.rig}): {words}: {verdict}")
+    print(f"{vehicle} ({run.rig}): {asked}: {verdict}")
     if not ack.accepted:
         raise typer.Exit(1)
 
 
-def _choose(runs: list[RunningRig], vehicle: str, pid: int | None) -> RunningRig:
-    """The run that is meant."""
-    if pid is not None:
-        runs = [run for run in runs if run.pid == pid]
-    if not runs:
-        whose = "" if pid is None else f" with process {pid}"
-        raise UsageError(f"no rig is running{whose}: start one with `groundstation run`")
-    fitting = [run for run in runs if vehicle in run.vehicles]
-    if not fitting:
-        known = ", ".join(name for run in runs for name in run.vehicles)
-        raise UsageError(f"no vehicle {vehicle!r} is running (running: {known})")
-    if len(fitting) > 1:
-        known = ", ".join(f"{run.pid} ({run.rig})" for run in fitting)
-        raise UsageError(f"several rigs fly a {vehicle!r}: choose one with --pid: {known}")
-    return fitting[0]
+def _shown(argument: Argument) -> str:
+    return argument.name.replace("_rad", "_deg")
+
+
+def _values(row: Action, words: list[str]) -> dict[str, object]:
+    """Arguments by name, SI, from words in order or as ``name=value``."""
+    names = {_shown(argument): argument for argument in row.arguments}
+    if not any("=" in word for word in words):
+        if len(words) != len(names):
+            wanted = " ".join(names) or "no arguments"
+            raise ArgumentError(f"{row.name} takes {wanted}, found {len(words)} words")
+        pairs = list(zip(names, words, strict=True))
+    else:
+        pairs = [(name, value) for name, _, value in (word.partition("=") for word in words)]
+    values: dict[str, object] = {}
+    for name, word in pairs:
+        argument = names.get(name)
+        if argument is None:
+            raise ArgumentError(f"{row.name} has no argument {name!r}: it takes {' '.join(names) or 'none'}")
+        values[argument.name] = _value(argument, name, word)
+    return values
+
+
+def _value(argument: Argument, name: str, word: str) -> object:
+    if argument.kind is str:
+        return word
+    try:
+        number = float(word) if argument.kind is float else int(word)
+    except ValueError:
+        raise ArgumentError(f"{name} is {word!r}, expected a number") from None
+    return math.radians(number) if name.endswith("_deg") else number

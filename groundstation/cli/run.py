@@ -12,16 +12,13 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from groundstation.cli.errors import UsageError
-from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.declarations.errors import GroundStationError, UsageError
+from groundstation.launch.live_run import LiveRun
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.core.library import default_core
 from groundstation.recording.writer import PART_SUFFIX
-from groundstation.runtime.errors import GroundStationError
-from groundstation.runtime.live_run import LiveRun
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import check_rig
-from groundstation.runtime.plan import check_addresses, processes_of
-from groundstation.runtime.rig import load_rig
+from groundstation.rig.read import parse_rig, read_text
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -43,18 +40,15 @@ def run(
     ] = False,
     seed: Annotated[int | None, typer.Option(help="Of the emulated laboratory, in lockstep.")] = None,
 ) -> None:
-    r"""Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
+    """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
 
-    For example:
+    Example: groundstation run examples/rigs/two_mock_ups.toml
 
-    \b
-      groundstation run examples/rigs/two_mock_ups.toml
-      groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
+    Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
-    loaded = load_rig(rig)
-    check_rig(loaded)
-    check_addresses(loaded)
-    processes_of(loaded)
+    default_core()  # before any process starts: what it lacks, all of them would
+    text = read_text(rig)
+    loaded = parse_rig(text, rig)
     if record is not None and record.exists():
         raise UsageError(f"{record} is already there: recordings are never overwritten")
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
@@ -63,15 +57,19 @@ def run(
         if duration is None:
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
         with _progress(duration) as update:
-            run_lockstep(loaded, rig, recording, duration, seed, update)
+            run_lockstep(loaded, text, rig, recording, duration, seed, update)
     else:
         if seed is not None:
             raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
-        _run_live(LiveRun(loaded, rig, recording), duration, headless=headless or not sys.stdout.isatty())
+        _run_live(
+            LiveRun(loaded, text, rig, recording), duration, headless=headless or not sys.stdout.isatty()
+        )
     finished = _say_recordings(recording)
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
+        from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
+
         print_report(finished[-1], report)
 
 

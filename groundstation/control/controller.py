@@ -15,6 +15,9 @@ class Controller(Protocol):
     def reset(self) -> None:
         """Forget the past: at arming, and whenever another source had the valves for long."""
 
+    def setpoint(self, goal: Goal) -> Goal:
+        """What the law works for at present, given the goal: its status reports the distance to it."""
+
     def update(
         self,
         state: ControlState,

@@ -70,6 +70,10 @@ class Formation:
         self._go_to.reset()
         self._held = None
 
+    def setpoint(self, goal: Goal) -> Goal:
+        """Where the neighbours want it; the goal before the first update."""
+        return self._held or goal
+
     def update(
         self,
         state: ControlState,

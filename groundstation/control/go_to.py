@@ -68,6 +68,10 @@ class GoTo:
         """Acceleration found beyond valves and known slope, (x, y)."""
         return self._station.disturbance_table_m_s2
 
+    def setpoint(self, goal: Goal) -> Goal:
+        """The goal itself."""
+        return goal
+
     def update(
         self,
         state: ControlState,

@@ -1,7 +1,14 @@
-"""THE TABLE of controllers: a new one is a file and a row here; the contract tests find the row."""
+"""The table of controllers: those of the tree, then those of installed packages.
+
+A new one is a file and a row here, or a row of another package under the entry point group
+``groundstation.controllers``; the contract tests find the row.
+"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel
@@ -13,7 +20,17 @@ from groundstation.control.keep_in import KeepIn
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 
+ENTRY_POINT_GROUP = "groundstation.controllers"
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
+
+
+class ControllerError(ValueError):
+    """A controller of an installed package cannot be used; the text is one sentence."""
+
+
+def _nobody(config: BaseModel) -> tuple[str, ...]:
+    del config
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,53 +39,90 @@ class ControllerRow(Generic[ConfigT]):
 
     Attributes:
         summary: What it does, for menus.
-        config: Model of its settings; validation names the wrong key.
+        config: Model of its parameters; validation names the wrong key.
         make: Builds one for a vehicle.
-        example: Settings that the contract tests run it with.
+        example: Parameters that the contract tests run it with.
+        neighbours: Other vehicles whose states it wants, by its parameters.
+        is_built_in: It is of the tree; others run in a process of their own.
     """
 
     summary: str
     config: type[ConfigT]
     make: Callable[[ConfigT, VehicleModel, KeepIn | None], Controller]
-    example: Mapping[str, Any]
+    example: Mapping[str, Any] = field(default_factory=dict)
+    neighbours: Callable[[ConfigT], tuple[str, ...]] = _nobody
+    is_built_in: bool = False
 
-    def build(self, settings: Mapping[str, Any], vehicle: VehicleModel, keep_in: KeepIn | None) -> Controller:
-        """A controller from the settings of a rig file.
+    def build(
+        self, parameters: Mapping[str, Any], vehicle: VehicleModel, keep_in: KeepIn | None
+    ) -> Controller:
+        """A controller from the parameters of a rig file.
 
         Raises:
-            pydantic.ValidationError: A setting is unknown, missing or out of range.
+            pydantic.ValidationError: A parameter is unknown, missing or out of range.
         """
-        return self.make(self.config.model_validate(dict(settings)), vehicle, keep_in)
+        return self.make(self.config.model_validate(dict(parameters)), vehicle, keep_in)
 
 
-CONTROLLERS: Mapping[str, ControllerRow[Any]] = {
-    "station": ControllerRow(
-        "hold the goal pose",
-        StationConfig,
-        lambda config, vehicle, _keep_in: StationKeeping(config, vehicle),
-        {},
-    ),
-    "go_to": ControllerRow("travel to the goal pose within limits, then hold it", GoToConfig, GoTo, {}),
-    "formation": ControllerRow(
-        "hold a pose relative to other mock-ups",
-        FormationConfig,
-        Formation,
-        {"neighbours": {"leader": {"offset_m": (-0.6, 0.0)}}, "goal_weight": 1.0},
-    ),
-}
+_BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
+    {
+        "station": ControllerRow(
+            "hold the goal pose",
+            StationConfig,
+            lambda config, vehicle, _keep_in: StationKeeping(config, vehicle),
+        ),
+        "go_to": ControllerRow("travel to the goal pose within limits, then hold it", GoToConfig, GoTo),
+        "formation": ControllerRow(
+            "hold a pose relative to other mock-ups",
+            FormationConfig,
+            Formation,
+            {"neighbours": {"leader": {"offset_m": (-0.6, 0.0)}}, "goal_weight": 1.0},
+            lambda config: tuple(config.neighbours),
+        ),
+    }
+)
+
+
+@cache
+def controllers() -> Mapping[str, ControllerRow[Any]]:
+    """Every controller by the rig's word for it.
+
+    Raises:
+        ControllerError: One of an installed package cannot be loaded, or takes a name that is in use.
+    """
+    rows = {name: replace(row, is_built_in=True) for name, row in _BUILT_IN.items()}
+    for point in entry_points(group=ENTRY_POINT_GROUP):
+        if point.name in rows:
+            raise ControllerError(
+                f"the controller {point.name!r} ({point.value}) takes a name that is in use"
+            )
+        rows[point.name] = _load(point)
+    return MappingProxyType(rows)
+
+
+def _load(point: EntryPoint) -> ControllerRow[Any]:
+    where = f"the controller {point.name!r} ({point.value})"
+    try:
+        row = point.load()
+    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+        raise ControllerError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
+    if not isinstance(row, ControllerRow):
+        raise ControllerError(f"{where} is a {type(row).__name__}, expected a ControllerRow")
+    return replace(row, is_built_in=False)
 
 
 def make_controller(
     name: str,
-    settings: Mapping[str, Any],
+    parameters: Mapping[str, Any],
     vehicle: VehicleModel,
     keep_in: KeepIn | None = None,
 ) -> Controller:
     """The named controller.
 
     Raises:
-        ValueError: No controller has that name, or a setting is wrong (pydantic names the key).
+        ValueError: No controller has that name, or a parameter is wrong (pydantic names the key).
     """
-    if name not in CONTROLLERS:
-        raise ValueError(f"no controller is called {name!r}; there are {', '.join(sorted(CONTROLLERS))}")
-    return CONTROLLERS[name].build(settings, vehicle, keep_in)
+    known = controllers()
+    if name not in known:
+        raise ValueError(f"no controller is called {name!r}; there are {', '.join(sorted(known))}")
+    return known[name].build(parameters, vehicle, keep_in)

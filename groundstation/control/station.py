@@ -89,6 +89,10 @@ class StationKeeping:
         """Acceleration found beyond valves and known slope, (x, y)."""
         return self._x.disturbance, self._y.disturbance
 
+    def setpoint(self, goal: Goal) -> Goal:
+        """The goal itself."""
+        return goal
+
     def update(
         self,
         state: ControlState,

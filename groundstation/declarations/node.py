@@ -5,6 +5,7 @@ same object: live, lockstep and replay. ``now_ns`` is the moment at which the ru
 arrival); runners write it into the journal, so that a replay tells the same moments.
 """
 
+import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ class Node(ABC):
     """Base of all nodes.
 
     Class attributes:
-        inputs: Payload classes it receives.
+        inputs: Payload classes it receives; a node may set them when it is made.
         outputs: Payload classes it may publish; the runner refuses others.
         trigger: What a message that is made in a tick was made from: the newest of this input. None
             where ticks report on the node itself.
@@ -29,7 +30,7 @@ class Node(ABC):
         tick_period_ns: 0 for a node that only answers messages.
     """
 
-    inputs: ClassVar[tuple[type[Message], ...]] = ()
+    inputs: tuple[type[Message], ...] = ()
     outputs: ClassVar[tuple[type[Message], ...]] = ()
     trigger: ClassVar[type[Message] | None] = None
 
@@ -88,6 +89,7 @@ class NodeRow:
         name: As in rig files, journals and health.
         process: Default process, or what says it; ``{vehicle}`` is filled in.
         weight: What it may share a process with.
+        kind: Its class, or ``module:Class`` where the module is imported only by the process that runs it.
         make: Builds it from the rig for a vehicle.
         condition: Whether a vehicle has it.
         is_of_rig: One for the whole rig instead of one per vehicle; its vehicle is empty.
@@ -96,6 +98,7 @@ class NodeRow:
     name: str
     process: str | Callable[[Rig, str], str]
     weight: Weight
+    kind: type[Node] | str
     make: Callable[[Rig, str], Node]
     condition: Callable[[Rig, str], bool] = always
     is_of_rig: bool = False
@@ -105,6 +108,14 @@ class NodeRow:
         if self.is_of_rig:
             return [""] if self.condition(rig, "") else []
         return [name for name in rig.vehicles if self.condition(rig, name)]
+
+    def node_class(self) -> type[Node]:
+        """Its class, imported now."""
+        if not isinstance(self.kind, str):
+            return self.kind
+        module, _, name = self.kind.partition(":")
+        found: type[Node] = getattr(importlib.import_module(module), name)
+        return found
 
     def home(self, rig: Rig, vehicle: str) -> str:
         """The process of the node: the rig's word, or the row's."""

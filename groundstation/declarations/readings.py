@@ -23,7 +23,7 @@ class _Second:
 
 @dataclass(slots=True)
 class RecentErrors:
-    """Distances between two poses over the last ``ERROR_WINDOW_S``, in sums of a second each."""
+    """Distances between two poses over the last ``ERROR_WINDOW_S``, summed per second."""
 
     _seconds: deque[_Second] = field(default_factory=deque)
 

@@ -91,9 +91,7 @@ class Argument:
         if isinstance(given, float) and not math.isfinite(given):
             raise ArgumentError(f"{action}: {self.name} is {given}, expected a finite number")
         if isinstance(given, float | int) and not self.low <= given <= self.high:
-            raise ArgumentError(
-                f"{action}: {self.name} is {given:g}, expected {self.low:g} to {self.high:g}"
-            )
+            raise ArgumentError(f"{action}: {self.name} is {given:g}, expected {self.low:g} to {self.high:g}")
         return given
 
 

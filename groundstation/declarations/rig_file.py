@@ -69,7 +69,7 @@ def _read(given: object, info: ValidationInfo) -> RigFile:
     if isinstance(given, RigFile):
         return given
     if not isinstance(given, str | Path):
-        raise ValueError("expected the path of a file")  # noqa: TRY004 - pydantic turns only ValueError to text
+        raise ValueError("expected the path of a file")
     read: ReadFile = (info.context or {})["read_file"]
     return read(str(given))
 

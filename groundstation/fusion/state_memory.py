@@ -2,22 +2,42 @@
 
 from collections import deque
 from dataclasses import replace
+from typing import Any, Generic, Protocol, TypeVar
 
 from groundstation.frames import wrap_angle
-from groundstation.messages.definitions import VehicleState
 
 MEMORY_NS = 2_000_000_000
 REACH_NS = 50_000_000
 """Between two states of 100 Hz there are 10 ms; farther than this the IMU has fallen silent."""
 
 
-class StateMemory:
+class PlanarMotion(Protocol):
+    """What is remembered: a frozen dataclass with at least these fields."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def position_table_m(self) -> tuple[float, float]: ...
+    @property
+    def heading_rad(self) -> float: ...
+    @property
+    def velocity_table_m_s(self) -> tuple[float, float]: ...
+    @property
+    def rate_rad_s(self) -> float: ...
+    @property
+    def status(self) -> str: ...
+
+
+S = TypeVar("S", bound=PlanarMotion)
+
+
+class StateMemory(Generic[S]):
     """Keeps states of a filter that is not lost."""
 
     def __init__(self) -> None:
-        self._states: deque[VehicleState] = deque()
+        self._states: deque[S] = deque()
 
-    def remember(self, state: VehicleState) -> None:
+    def remember(self, state: S) -> None:
         """Take the next state; a lost filter's empties the memory."""
         states = self._states
         if state.status != "flying":
@@ -27,7 +47,7 @@ class StateMemory:
         while state.stamp_ns - states[0].stamp_ns > MEMORY_NS:
             states.popleft()
 
-    def at(self, stamp_ns: int) -> VehicleState | None:
+    def at(self, stamp_ns: int) -> S | None:
         """The state at a moment: between its neighbours, or the newest carried on; None if none is near."""
         after = None
         for before in reversed(self._states):
@@ -37,7 +57,7 @@ class StateMemory:
         return None
 
 
-def _between(before: VehicleState, after: VehicleState | None, stamp_ns: int) -> VehicleState | None:
+def _between(before: S, after: S | None, stamp_ns: int) -> S | None:
     if stamp_ns - before.stamp_ns > REACH_NS:
         return None
     span_s = (stamp_ns - before.stamp_ns) * 1e-9
@@ -57,11 +77,13 @@ def _between(before: VehicleState, after: VehicleState | None, stamp_ns: int) ->
     else:
         heading, rate_then = before.heading_rad, rate
     (vx0, vy0) = before.velocity_table_m_s
-    return replace(
-        before,
+    dataclass: Any = before  # a protocol cannot say that it is one
+    moved: S = replace(
+        dataclass,
         stamp_ns=stamp_ns,
         position_table_m=(x + vx0 * span_s, y + vy0 * span_s),
         velocity_table_m_s=(vx, vy),
         heading_rad=wrap_angle(heading + rate * span_s),
         rate_rad_s=rate_then,
     )
+    return moved

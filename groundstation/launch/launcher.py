@@ -1,10 +1,12 @@
 """Starts the processes of a rig, knows when each is ready, restarts what died, ends all in good order.
 
-The hub lives here. Children have sessions of their own, so that Ctrl-C reaches the launcher alone; the
-end of their stdin tells them that the launcher is gone, however it went. Nothing here blocks for long:
-whoever supervises can always be asked to end.
+The hub lives here. The processes are forked from a server that has loaded all they need; the emulated
+laboratory, which stands for hardware, is an interpreter of its own. All have sessions of their own, so that
+Ctrl-C reaches the launcher alone; the end of their stdin tells them that the launcher is gone, however it
+went. Nothing here blocks for long: whoever supervises can always be asked to end.
 """
 
+import pickle
 import queue
 import socket
 import time
@@ -16,19 +18,23 @@ import zenoh
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus, open_hub
-from groundstation.runtime.child import Child
-from groundstation.runtime.errors import GroundStationError, RigError
-from groundstation.runtime.plan import RECORDER, processes_of
-from groundstation.runtime.process import Orders
-from groundstation.runtime.rig import Rig
+from groundstation.declarations.errors import GroundStationError, RigError
+from groundstation.declarations.node import COMMANDS
+from groundstation.declarations.rig import Rig
+from groundstation.launch import process, recorder
+from groundstation.launch.child import Child, start_python
+from groundstation.launch.fork_server import ForkServer
+from groundstation.launch.orders import Go, Orders
+from groundstation.launch.running_time import RunningTime
+from groundstation.rig.plan import RECORDER, processes_of
+from groundstation.rig.read import bytes_of
 
 LABORATORY = "laboratory"
-COMMANDS = "commands"
 START_S = 30.0
 """A process that is not ready by then never will be."""
 HOPELESS = 4  # restarts of a process that was never ready
 HUNG_S = 4.0
-"""Processes give a sign of life ten times a second; the recorder, once."""
+"""Processes publish a batch of the record stream ten times a second, be it empty; the recorder, once."""
 STOP_COMMANDS_S, STOP_NODES_S, STOP_ALL_S = 0.7, 1.5, 2.2
 SEQUENCES_PER_S = 2000
 """No topic is faster; so numbers of a process that starts again do not repeat those of its last life."""
@@ -41,7 +47,9 @@ class Launcher:
 
     Args:
         rig: The rig.
-        rig_path: Its file, for the children; what it says now holds for the whole run.
+        rig_text: What its file said when the rig was read; holds, as do the files that it names, for the
+            whole run.
+        rig_path: The file.
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
 
@@ -49,9 +57,10 @@ class Launcher:
         RigError: The rig names a laboratory that is not installed.
     """
 
-    def __init__(self, rig: Rig, rig_path: Path, recording: Path | None, say: Say) -> None:
+    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path | None, say: Say) -> None:
         self._rig_path = rig_path
-        self._rig_text = rig_path.read_text()
+        self._rig_text = rig_text
+        self._files = bytes_of(rig)
         self._recording = recording
         self._say = say
         self._addresses: dict[str, Address] | None = None if rig.laboratory is not None else {}
@@ -64,19 +73,22 @@ class Launcher:
             self._laboratory = Child(LABORATORY)
             self._package = _package_of(rig.laboratory.name)
         self._began_s = 0.0
-        self._untold: set[str] = set()  # started, but still without orders
+        self._time = RunningTime()
+        self._fork_server = ForkServer(("groundstation.launch.preload",))
+        self._waiting: set[str] = set()  # started, but not told to go
         self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
     def start(self) -> None:
-        """Open the hub and start everything; orders follow once the laboratory has said its ports."""
+        """Start everything; processes go once the laboratory has announced its ports."""
         self._began_s = time.monotonic()
+        if self._laboratory is not None:
+            self._start_laboratory(self._laboratory)  # it takes longest
+        self._fork_server.start()  # before the hub, which has threads
         self.endpoint, self._hub = _open_hub()
         self.bus = ZenohBus(self.endpoint)
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
-        if self._laboratory is not None:
-            self._start_laboratory(self._laboratory)
         for child in self._children.values():
             self._start(child)
 
@@ -96,11 +108,11 @@ class Launcher:
         """Names of the processes that are not ready."""
         return [child.name for child in self.children if not child.is_ready]
 
-    def heard(self, process: str) -> None:
-        """Note a sign of life (its journal) of a process; called from the bus's thread."""
-        child = self._children.get(process)
+    def heard(self, name: str) -> None:
+        """Note a sign of life of a process: a batch of its record stream; called from the bus's thread."""
+        child = self._children.get(name)
         if child is not None:
-            child.last_heard_s = time.monotonic()
+            child.last_sign_s = self._time.now_s
 
     def supervise(self) -> None:
         """Look after the children once; call a few times a second.
@@ -116,14 +128,17 @@ class Launcher:
                 known.is_ready = alive
                 known.has_been_ready |= alive
         for child in self.children:
-            while not child.complaints.empty():
-                self._say(f"{child.name}: {child.complaints.get()}")
+            for line in child.complaints():
+                self._say(f"{child.name}: {line}")
             if child.has_refused:
                 raise RigError(child.last_words.removeprefix("groundstation: "))
         now_s = time.monotonic()
+        self._time.step(now_s)
+        if self._fork_server.keep():
+            self._say("the fork server has ended; another one was started, the processes go on")
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
-        self._tell_all()
+        self._let_go()
         for child in self._children.values():
             self._look_after(child, now_s)
 
@@ -150,18 +165,18 @@ class Launcher:
                     child.kill()
                     child.restart_at_s = None
         elif not laboratory.is_ready:
-            self._listen_to(laboratory, now_s)
+            self._read_announcement(laboratory)
 
-    def _listen_to(self, laboratory: Child, now_s: float) -> None:
-        while not laboratory.said.empty():
+    def _read_announcement(self, laboratory: Child) -> None:
+        for line in laboratory.output():
             try:
-                self._addresses = parse_announcement(laboratory.said.get())
+                self._addresses = parse_announcement(line)
             except ValueError as error:
                 raise GroundStationError(f"the laboratory announces its ports wrongly: {error}") from error
             if self._addresses is not None:
                 laboratory.is_ready = True
                 return
-        if now_s - laboratory.started_s > START_S:
+        if self._time.now_s - laboratory.started_s > START_S:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
 
     def _look_after(self, child: Child, now_s: float) -> None:
@@ -178,49 +193,46 @@ class Launcher:
                     f"{child.name} was started {child.restarts + 1} times in vain: it {how}"
                 )
             self._say(f"{child.name} {how}; starting it again in {child.back_off(now_s):.2g} s")
-        elif child.last_heard_s and now_s - child.last_heard_s > HUNG_S:
+        elif child.last_sign_s is None:
+            if self._time.now_s - child.started_s > START_S:
+                self._say(f"{child.name} is not ready after {START_S:g} s, killing it")
+                child.kill()
+        elif self._time.now_s - child.last_sign_s > HUNG_S:
             self._say(f"{child.name} hangs: no sign of life for {HUNG_S:g} s, killing it")
-            child.kill()
-        elif not child.last_heard_s and now_s - child.started_s > START_S:
-            self._say(f"{child.name} is not ready after {START_S:g} s, killing it")
             child.kill()
 
     def _start(self, child: Child) -> None:
-        module = "recorder" if child.name == RECORDER else "process"
-        child.start(["-m", f"groundstation.runtime.{module}", child.name])  # the name is for `ps`
-        if child.name == RECORDER:
-            self._tell(child)
-        else:
-            self._untold.add(child.name)
-
-    def _tell_all(self) -> None:
-        """Give orders once the ports are known and the recorder listens: a replay needs the first byte."""
-        recorder = self._children.get(RECORDER)
-        if self._addresses is None or not (recorder is None or recorder.has_been_ready):
-            return
-        for name in sorted(self._untold):
-            self._tell(self._children[name])
-        self._untold.clear()
-
-    def _tell(self, child: Child) -> None:
-        """Give a started process its orders; it may have loaded what it needs while we did not know them."""
+        """Fork a process; it builds its nodes while the laboratory and the recorder still start."""
         elapsed_s = time.monotonic() - self._began_s
         orders = Orders(
             process=child.name,
-            rig=str(self._rig_path),
+            rig_path=self._rig_path,
             rig_text=self._rig_text,
+            files=self._files,
             endpoint=self.endpoint,
-            addresses=dict(self._addresses or {}),
-            recording=None if self._recording is None else str(_numbered(self._recording, child.restarts)),
+            recording=None if self._recording is None else _numbered(self._recording, child.restarts),
             utc_offset_ns=time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns(),
             sequences_after=round(elapsed_s * SEQUENCES_PER_S) if child.restarts else 0,
         )
-        child.started_s = time.monotonic()
-        child.tell(orders.line())
+        target = recorder.main if child.name == RECORDER else process.main
+        child.adopt(self._fork_server.fork(child.name, target, orders), self._time.now_s)
+        if child.name != RECORDER:
+            self._waiting.add(child.name)
+
+    def _let_go(self) -> None:
+        """Tell processes to go once the ports are known and the recorder listens: replays need all bytes."""
+        first = self._children.get(RECORDER)
+        if self._addresses is None or not (first is None or first.has_been_ready):
+            return
+        for name in sorted(self._waiting):
+            child = self._children[name]
+            child.started_s = self._time.now_s
+            child.write(pickle.dumps(Go(dict(self._addresses))))
+        self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
         self._addresses = None
-        laboratory.start(["-m", self._package, str(self._rig_path)])
+        laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
 
     def close(self) -> None:
         """Valves first, then every child, then the hub; nothing is left behind after three seconds."""
@@ -238,6 +250,7 @@ class Launcher:
                 child.wait(begin_s + within_s)
         for child in self.children:
             child.release()
+        self._fork_server.close()
         if self.bus is not None:
             self.bus.close()
         if self._hub is not None and not self._hub.is_closed():

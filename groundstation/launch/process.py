@@ -1,31 +1,26 @@
-"""One child process of the launcher: ``python -m groundstation.runtime.process``.
-
-Its orders are one JSON line on stdin. Stdin then stays open for as long as the launcher lives: its end
-means that nobody watches any more, and the process stops in good order, valves first.
-"""
+"""One process of a rig: builds its nodes, and runs them until it is asked to stop or the launcher is gone."""
 
 import gc
-import json
 import os
+import pickle
 import signal
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, NoReturn
 
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.declarations.errors import GroundStationError, RigError, UsageError
 from groundstation.files.errors import CalibrationFileError
-from groundstation.runtime.child import REFUSAL
-from groundstation.runtime.errors import RigError, UsageError
-from groundstation.runtime.live import LiveProcess
-from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.plan import gives_way, resolved_ports
-from groundstation.runtime.rig import parse_rig
-from groundstation.runtime.slot import Sequences
+from groundstation.launch.child import REFUSAL
+from groundstation.launch.orders import Go, Orders
+from groundstation.recording.policy import ImagePolicy
+from groundstation.rig.plan import gives_way, resolved_ports
+from groundstation.rig.read import parse_rig
+from groundstation.runners.live import LiveProcess
+from groundstation.runners.slot import Sequences
+from groundstation.runners.step import build_slots
 
 SWITCH_INTERVAL_S = 0.0005
 """How long a thread that computes may keep one that reads a port waiting; CPython's 5 ms is late."""
@@ -33,57 +28,45 @@ SWITCH_INTERVAL_S = 0.0005
 NICENESS = 5
 """Of processes that give way: on a busy machine who flies goes first."""
 
-
-@dataclass(frozen=True)
-class Orders:
-    """What a child is told.
-
-    Attributes:
-        process: Its name in the plan.
-        rig: Path of the rig file.
-        rig_text: What the file said when the run began.
-        endpoint: Of the hub.
-        addresses: Of the laboratory's channels, as announced.
-        recording: Path of the recording; used by the recorder.
-        utc_offset_ns: UTC minus monotonic clock; used by the recorder.
-        sequences_after: Sequence numbers begin after this one.
-    """
-
-    process: str
-    rig: str
-    rig_text: str
-    endpoint: str
-    addresses: dict[str, Any]
-    recording: str | None = None
-    utc_offset_ns: int = 0
-    sequences_after: int = 0
-
-    def line(self) -> bytes:
-        """As it is written to the child's stdin."""
-        return json.dumps(asdict(self)).encode() + b"\n"
+TROUBLE = 1
+"""Exit code of a process that could not go on for a reason that it names on stderr."""
 
 
-def read_orders() -> Orders | None:
-    """Read the orders from stdin; None if the launcher ended before it gave any."""
-    line = sys.stdin.buffer.readline()
-    return Orders(**json.loads(line)) if line else None
+def main(orders: Orders) -> None:
+    """Run the nodes of a process; what the fork server calls."""
+    obey(run, orders)
 
 
-def obey(run: Callable[[Orders], None]) -> NoReturn:
-    """Read the orders, carry them out and end the process.
+def obey(work: Callable[[Orders], None], orders: Orders) -> None:
+    """Carry out orders and end the process.
 
-    What the orders name and cannot be used is said in one sentence on stderr.
+    What the orders name and cannot be used is written in one sentence to stderr.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    orders, code = read_orders(), 0
-    if orders is not None:
-        try:
-            run(orders)
-        except (UsageError, CalibrationFileError, DeviceError) as error:
-            sys.stderr.write(" ".join(str(error).split()) + "\n")
-            code = REFUSAL
+    code = 0
+    try:
+        work(orders)
+    except (UsageError, CalibrationFileError, DeviceError) as error:
+        code = _end_with(error, REFUSAL)
+    except GroundStationError as error:
+        code = _end_with(error, TROUBLE)
     sys.stderr.flush()
     os._exit(code)  # all is closed; taking the interpreter apart would cost what the end of a run has not
+
+
+def _end_with(error: Exception, code: int) -> int:
+    sys.stderr.write(" ".join(str(error).split()) + "\n")
+    return code
+
+
+def wait_for_go() -> Go | None:
+    """What the launcher sends once the process may open its ports; None if it ended before."""
+    try:
+        go = pickle.load(sys.stdin.buffer)
+    except EOFError:
+        return None
+    assert isinstance(go, Go)
+    return go
 
 
 def stop_when_asked(stop: Callable[[], None]) -> None:
@@ -102,32 +85,32 @@ def stop_when_asked(stop: Callable[[], None]) -> None:
 
 
 def run(orders: Orders) -> None:
-    """Build the nodes of the process and run them until told to stop."""
-    rig = parse_rig(orders.rig_text, Path(orders.rig))
+    """Build the nodes of the process, wait until it may go, run them until asked to stop."""
+    rig = parse_rig(orders.rig_text, orders.rig_path, orders.files)
     journal, sequences = JournalWriter(), Sequences(orders.sequences_after)
     try:
         slots = build_slots(rig, orders.process, journal, sequences)
     except ValueError as error:  # a number that no check of the rig file knows of, but some node does
-        raise RigError(f"{orders.rig}: {error}") from error
-    ports = [port for port in resolved_ports(rig, orders.addresses) if port.process == orders.process]
+        raise RigError(f"{orders.rig_path}: {error}") from error
     if gives_way(rig, orders.process):
         os.nice(NICENESS)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds
+    go = wait_for_go()
+    if go is None:
+        return
+    ports = resolved_ports(rig, orders.process, go.addresses)
     with ZenohBus(orders.endpoint) as bus:
         process = LiveProcess(
             orders.process,
             slots,
             ports,
             bus,
+            rig.tables.payloads,
             journal,
             sequences,
-            publish_images=rig.record.images == "lossless",
+            images=ImagePolicy(rig.record.images),
         )
         stop_when_asked(process.stop)
         process.run()
-
-
-if __name__ == "__main__":
-    obey(run)

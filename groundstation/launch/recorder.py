@@ -1,87 +1,95 @@
-"""The recorder's process, ``python -m groundstation.runtime.recorder``: hears the bus and writes it."""
+"""The recorder's process: takes the record stream of every process and writes it to one file."""
 
 import os
 import queue
 import sys
 import time
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 
-from groundstation.bus.envelope import Envelope
-from groundstation.bus.topics import topic_named, topic_of
-from groundstation.bus.zenoh_bus import ZenohBus, split_key
-from groundstation.messages.definitions import Journal
+from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
+from groundstation.bus.zenoh_bus import RECORD, ZenohBus
+from groundstation.declarations.errors import GroundStationError, UsageError
+from groundstation.declarations.message import Message
+from groundstation.launch.orders import Orders
+from groundstation.launch.process import NICENESS, obey, stop_when_asked
 from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.process import NICENESS, Orders, obey, stop_when_asked
-from groundstation.runtime.provenance import recording_info
-from groundstation.runtime.rig import parse_rig
-from groundstation.runtime.slot import Sequences
+from groundstation.rig.provenance import recording_info
+from groundstation.rig.read import parse_rig
 
 TICK_S = 0.05
 ALIVE_PERIOD_NS = 1_000_000_000
 
 
+def main(orders: Orders) -> None:
+    """Record; what the fork server calls."""
+    obey(run, orders)
+
+
 def run(orders: Orders) -> None:
-    """Record until told to stop; what is still in the queue then is written too.
+    """Record until asked to stop; what is still in the queue then is written too.
 
     Raises:
-        UsageError: The file cannot be written.
+        UsageError: The file cannot be begun.
+        GroundStationError: It cannot be written any further: the disk is full, or gone.
     """
     assert orders.recording is not None
     os.nice(NICENESS)
-    rig_path = Path(orders.rig)
-    rig = parse_rig(orders.rig_text, rig_path)
-    info = recording_info(rig, rig_path, seed=None, utc_offset_ns=orders.utc_offset_ns)
+    rig = parse_rig(orders.rig_text, orders.rig_path, orders.files)
+    info = recording_info(rig, orders.rig_text, orders.rig_path, None, orders.utc_offset_ns)
+    batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+    stop_when_asked(lambda: batches.put(None))
+    recorder = _begin(orders.recording, info)
     try:
-        recorder = Recorder(Path(orders.recording), replace(info, rig_toml=orders.rig_text))
+        with ZenohBus(orders.endpoint) as bus:
+            bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
+            bus.announce(orders.process)
+            _record(recorder, batches, bus, orders.process, rig.tables.payloads)
+        recorder.finish()
+    except OSError as error:
+        raise GroundStationError(
+            f"{recorder.part_path} cannot be written any further: {error.strerror or error} "
+            f"(after {recorder.message_count} messages, which stay there)"
+        ) from error
+
+
+def _begin(path: Path, info: RecordingInfo) -> Recorder:
+    try:
+        return Recorder(path, info)
     except RecordingError as error:
         raise UsageError(str(error)) from error
-    with recorder, ZenohBus(orders.endpoint) as bus:
-        _record(recorder, bus, orders)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def _record(recorder: Recorder, bus: ZenohBus, orders: Orders) -> None:
-    heard: queue.SimpleQueue[tuple[str, bytes, bytes, int] | None] = queue.SimpleQueue()
-    latched: dict[tuple[str, str], tuple[int, int]] = {}
-    alive_topic, sequences, alive_due_ns = topic_of(Journal), Sequences(orders.sequences_after), 0
-    bus.subscribe(
-        "*/*", lambda key, data, attachment: heard.put((key, data, attachment, time.monotonic_ns()))
-    )
-    stop_when_asked(lambda: heard.put(None))
-    bus.announce(orders.process)
+def _record(
+    recorder: Recorder,
+    batches: "queue.SimpleQueue[bytes | None]",
+    bus: ZenohBus,
+    process: str,
+    payloads: Mapping[str, type[Message]],
+) -> None:
+    """Write until the queue holds None."""
+    sign_due_ns = 0
     while True:
         now_ns = time.monotonic_ns()
-        if now_ns >= alive_due_ns:  # an empty journal is its sign of life
-            alive_due_ns = now_ns + ALIVE_PERIOD_NS
-            number = sequences.next(alive_topic, orders.process)
-            sign = Journal(now_ns, "", orders.process, (), b"")
-            bus.publish(Envelope(alive_topic, orders.process, number, now_ns), alive_topic.codec.encode(sign))
+        if now_ns >= sign_due_ns:  # an empty batch is its sign of life
+            sign_due_ns = now_ns + ALIVE_PERIOD_NS
+            bus.publish_batch(process, RecordWriter().take())
         try:
-            item = heard.get(timeout=TICK_S)
+            batch = batches.get(timeout=TICK_S)
         except queue.Empty:
             recorder.tick(time.monotonic_ns())
             continue
-        if item is None:
+        if batch is None:
             return
-        key, data, attachment, arrival_ns = item
-        owner, noun = split_key(key)
-        if owner == orders.process:
-            continue
         try:
-            topic = topic_named(noun)
-            envelope = Envelope.unpack(topic, owner, attachment)
-        except (KeyError, ValueError) as error:
-            sys.stderr.write(f"not recorded: {key}, which is none of our messages ({error})\n")
+            entries = read_batch(batch)
+        except BatchError as error:
+            sys.stderr.write(f"not recorded: {error}\n")
             continue
-        if topic.latched:  # repeated for late joiners: one is enough
-            said = (envelope.sequence, envelope.publish_ns)
-            if latched.get((owner, noun)) == said:
-                continue
-            latched[owner, noun] = said
-        recorder.record_encoded(envelope, data, arrival_ns)
-
-
-if __name__ == "__main__":
-    obey(run)
+        unknown = recorder.record_batch(entries, payloads)
+        if unknown:
+            sys.stderr.write(f"not recorded: {unknown} messages of topics that no part declares\n")

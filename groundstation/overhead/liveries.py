@@ -6,13 +6,14 @@ One table per mock-up: ``height_m`` of the circles above the table, their ``radi
 
 import itertools
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.toml_file import parse_toml
 
 COLOURS = ("red", "green", "blue")
 MIN_DIFFERENCE_M = 0.02
@@ -87,22 +88,25 @@ def load_liveries(path: Path | str) -> tuple[Livery, ...]:
     """Read the circles of all mock-ups.
 
     Raises:
-        CalibrationFileError: The file is missing, no TOML, or a key is missing or impossible.
+        FileError: The file is missing, no TOML, or a key is missing or impossible.
     """
-    path = Path(path)
+    return parse_liveries(read_bytes(Path(path)), Path(path))
+
+
+def parse_liveries(data: bytes, path: Path) -> tuple[Livery, ...]:
+    """Read the content of the file of circles.
+
+    Raises:
+        FileError: It is no TOML, or a key is missing or impossible.
+    """
+    found = parse_toml(data, path)
+    if not found:
+        raise FileError(f"{path}: names no mock-up; expected a table like [alpha].")
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CalibrationFileError(f"{path}: is no TOML file ({error}).") from error
-    if not data:
-        raise CalibrationFileError(f"{path}: names no mock-up; expected a table like [alpha].")
-    try:
-        liveries = tuple(_livery(name, table) for name, table in data.items())
+        liveries = tuple(_livery(name, table) for name, table in found.items())
         check_distinct(liveries)
     except ValueError as error:
-        raise CalibrationFileError(f"{path}: {error}.") from error
+        raise FileError(f"{path}: {error}.") from error
     return liveries
 
 

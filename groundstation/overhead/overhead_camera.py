@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import CalibrationFileError
-from groundstation.files.json_file import read_camera_file
+from groundstation.files.errors import FileError
+from groundstation.files.json_file import parse_json
+from groundstation.files.reading import read_bytes
 from groundstation.frames import turned_axes
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
@@ -74,14 +75,27 @@ class OverheadCamera:
         """Read the camera's JSON file.
 
         Raises:
-            CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
+            FileError: The file is missing, no JSON, or a key is missing or impossible.
         """
-        path = Path(path)
-        data = read_camera_file(path)
+        return cls.parse(read_bytes(Path(path)), Path(path))
+
+    @classmethod
+    def parse(cls, data: bytes, path: Path, known: Mapping[str, Any] | None = None) -> "OverheadCamera":
+        """Read the content of the camera's JSON file.
+
+        Args:
+            data: The content.
+            path: Its name, for what is said of it.
+            known: Stands in for keys that the file lacks.
+
+        Raises:
+            FileError: It is no JSON, or a key is missing or impossible.
+        """
+        found = parse_json(data, path)
         try:
-            return cls.from_mapping(data)
+            return cls.from_mapping({**(known or {}), **found})
         except ValueError as error:
-            raise CalibrationFileError(f"{path}: {error}.") from error
+            raise FileError(f"{path}: {error}.") from error
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> "OverheadCamera":

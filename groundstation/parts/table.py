@@ -1,4 +1,7 @@
-"""The table of parts: those of the tree, then those of installed packages (entry points ``groundstation.parts``)."""
+"""The table of parts: those of the tree, then those of installed packages.
+
+A package adds its own by an entry point of the group ``groundstation.parts``.
+"""
 
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -21,13 +24,14 @@ def installed_tables() -> Tables:
     from groundstation.parts.control.part import PART as CONTROL
     from groundstation.parts.fusion.part import PART as FUSION
     from groundstation.parts.imu.part import PART as IMU
+    from groundstation.parts.laboratory.part import PART as LABORATORY
     from groundstation.parts.operation.part import PART as OPERATION
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
     from groundstation.parts.stars.part import PART as STARS
     from groundstation.parts.valves.part import PART as VALVES
 
-    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, REFERENCE)
+    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE)
     points = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name)
     try:
         return Tables((*own, *map(_load, points)), topics=(Journal,))

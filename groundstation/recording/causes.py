@@ -1,32 +1,17 @@
 """What a recorded message was made from, read out of the journals.
 
-A journal says in order what each node consumed and said. What a node says while it handles an input was
-triggered by that input; what it says in a tick comes from the newest input of each topic it hears.
+A journal names in order what each node consumed and published. What a node publishes while it handles an
+input was triggered by that input; what it publishes in a tick comes from the newest input of each topic.
 """
 
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
-from groundstation.bus.journal import NO_NODE, Kind, read_entries
-from groundstation.bus.topics import TOPICS, Topic, topic_of
-from groundstation.messages.definitions import Journal
+from groundstation.bus.envelope import Cause
+from groundstation.bus.journal import Journal, Kind, read_entries
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
-
-
-class Reference(NamedTuple):
-    """A recorded message: topic row, owner, sequence."""
-
-    topic_index: int
-    owner: str
-    sequence: int
-
-    @property
-    def topic(self) -> Topic:
-        """The row of the topic table."""
-        return TOPICS[self.topic_index]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,23 +20,27 @@ class Origin:
 
     Attributes:
         message: The message.
-        node: Key of the node that said it, empty for a port.
-        told_ns: When the node was told what made it say so.
+        node: Key of the node that published it, empty for a port.
+        told_ns: When the node was told what made it publish.
         wall_ns: Wall time of that call, 0 in lockstep.
         causes: The trigger first, then the newest of the node's other inputs.
     """
 
-    message: Reference
+    message: Cause
     node: str
     told_ns: int
     wall_ns: int
-    causes: tuple[Reference, ...]
+    causes: tuple[Cause, ...]
 
 
 @dataclass(slots=True)
 class _NodeMemory:
-    newest: dict[tuple[int, str], Reference] = field(default_factory=dict)
-    trigger: Reference | None = None
+    newest: dict[tuple[str, str], Cause] = field(default_factory=dict)
+    trigger: Cause | None = None
+
+    def causes(self) -> tuple[Cause, ...]:
+        others = tuple(cause for cause in self.newest.values() if cause != self.trigger)
+        return others if self.trigger is None else (self.trigger, *others)
 
 
 class CauseIndex:
@@ -65,17 +54,17 @@ class CauseIndex:
     """
 
     def __init__(self, recording: Recording) -> None:
-        self._origins: dict[Reference, Origin] = {}
+        self._origins: dict[Cause, Origin] = {}
         memories: dict[str, _NodeMemory] = {}
         journals = 0
-        for delivered in recording.delivered([topic_of(Journal)]):
+        for delivered in recording.delivered([Journal]):
             assert isinstance(delivered.payload, Journal)
             journals += 1
             self._read(delivered.payload, memories)
         if not journals:
             raise RecordingError(f"{recording.path} holds no journal, so causes are not known")
 
-    def __getitem__(self, message: Reference) -> Origin:
+    def __getitem__(self, message: Cause) -> Origin:
         """The origin of a message.
 
         Raises:
@@ -84,17 +73,17 @@ class CauseIndex:
         try:
             return self._origins[message]
         except KeyError:
-            name = f"{message.owner}/{message.topic.noun} number {message.sequence}"
+            name = f"{message.owner}/{message.noun} number {message.sequence}"
             raise RecordingError(f"the journals name no {name}") from None
 
-    def chain(self, message: Reference) -> Iterator[tuple[int, Origin]]:
+    def chain(self, message: Cause) -> Iterator[tuple[int, Origin]]:
         """A message and what it was made from, the nearest first, with the number of steps back.
 
         Of each topic only the newest message: the loop is closed, so every command has all of the
         past among its causes.
         """
         waiting = deque([(0, message)])
-        seen = {(message.topic_index, message.owner)}
+        seen = {(message.noun, message.owner)}
         while waiting:
             steps, reference = waiting.popleft()
             origin = self._origins.get(reference)
@@ -102,33 +91,21 @@ class CauseIndex:
                 continue  # before the recording began
             yield steps, origin
             for cause in origin.causes:
-                if (cause.topic_index, cause.owner) not in seen:
-                    seen.add((cause.topic_index, cause.owner))
+                if (cause.noun, cause.owner) not in seen:
+                    seen.add((cause.noun, cause.owner))
                     waiting.append((steps + 1, cause))
 
     def _read(self, journal: Journal, memories: dict[str, _NodeMemory]) -> None:
-        for row in read_entries(journal.entries):
-            kind = Kind(int(row["kind"]))
-            reference = Reference(int(row["topic"]), journal.names[row["owner"]], int(row["sequence"]))
-            if kind is Kind.PORT:
-                self._origins[reference] = Origin(reference, "", int(row["now_ns"]), 0, ())
+        for now_ns, kind, node, noun, owner, sequence, wall_ns in read_entries(journal):
+            message = Cause(noun, owner, sequence)
+            if kind == Kind.PORT:
+                self._origins[message] = Origin(message, "", now_ns, 0, ())
                 continue
-            if row["node"] == NO_NODE:
-                continue
-            node = journal.names[row["node"]]
             memory = memories.setdefault(node, _NodeMemory())
-            if kind is Kind.INPUT:
-                memory.newest[reference.topic_index, reference.owner] = reference
-                memory.trigger = reference
-            elif kind is Kind.OUTPUT:
-                self._origins[reference] = Origin(
-                    reference, node, int(row["now_ns"]), int(row["wall_ns"]), _causes(memory)
-                )
-            else:
+            if kind == Kind.INPUT:
+                memory.newest[noun, owner] = message
+                memory.trigger = message
+            elif kind == Kind.OUTPUT:
+                self._origins[message] = Origin(message, node, now_ns, wall_ns, memory.causes())
+            elif kind in (Kind.START, Kind.TICK, Kind.STOP):
                 memory.trigger = None
-
-
-def _causes(memory: _NodeMemory) -> tuple[Reference, ...]:
-    trigger = memory.trigger
-    others = tuple(reference for reference in memory.newest.values() if reference != trigger)
-    return others if trigger is None else (trigger, *others)

@@ -4,21 +4,13 @@ The last part is the topic's noun; what stands before it is the owner: a vehicle
 where the topic belongs to the whole rig.
 """
 
-from groundstation.bus.topics import Scope, Topic, topic_named
 
-
-def channel_name(topic: Topic, owner: str) -> str:
+def channel_name(noun: str, owner: str) -> str:
     """Name of the channel of one topic of one owner."""
-    if topic.scope is Scope.RIG or not owner:
-        return f"/{topic.noun}"
-    return f"/{owner}/{topic.noun}"
+    return f"/{owner}/{noun}" if owner else f"/{noun}"
 
 
-def parse_channel(name: str) -> tuple[Topic, str] | None:
-    """Topic and owner of a channel; None for a channel that is not of the topic table."""
-    owner, slash, noun = name.removeprefix("/").rpartition("/")
-    del slash
-    try:
-        return topic_named(noun), owner
-    except KeyError:
-        return None
+def parse_channel(name: str) -> tuple[str, str]:
+    """Noun and owner of a channel."""
+    owner, _, noun = name.removeprefix("/").rpartition("/")
+    return noun, owner

@@ -10,6 +10,8 @@ from groundstation.recording.errors import RecordingError
 from groundstation.recording.policy import ImagePolicy
 
 METADATA_NAME = "groundstation"
+FORMAT = 2
+"""Of this program's recordings; 1 named topics in journals by the row of a table."""
 _CALIBRATION = "calibration/"
 
 
@@ -39,6 +41,7 @@ class RecordingInfo:
     def to_metadata(self) -> dict[str, str]:
         """Keys and texts of the metadata record, in a fixed order."""
         out = {
+            "format": str(FORMAT),
             "rig": self.rig_toml,
             "rig_path": self.rig_path,
             "images": self.images.value,
@@ -60,6 +63,15 @@ class RecordingInfo:
         Raises:
             RecordingError: A number or the image policy cannot be read.
         """
+        try:
+            version = int(said.get("format", "1"))
+        except ValueError as error:
+            raise RecordingError(f"metadata record {METADATA_NAME!r}: {error}") from error
+        if version != FORMAT:
+            raise RecordingError(
+                f"it is of recording format {version}, this program reads format {FORMAT}: "
+                f"use the version that recorded it ({said.get('software', '') or 'unknown'})"
+            )
         try:
             return cls(
                 rig_toml=said.get("rig", ""),

@@ -2,8 +2,7 @@
 
 from enum import StrEnum
 
-from groundstation.bus.topics import TOPICS, Recorded, Topic, topic_of
-from groundstation.messages.definitions import StarPicture, StarSpots
+from groundstation.declarations.topic import Recorded, Topic
 
 
 class ImagePolicy(StrEnum):
@@ -14,14 +13,13 @@ class ImagePolicy(StrEnum):
     LOSSLESS = "lossless"  # the raw images too: spot finding can be re-run
 
 
-_IMAGES = frozenset(topic for topic in TOPICS if topic.recorded is Recorded.IMAGES)
-_DROPPED = {
-    ImagePolicy.OFF: _IMAGES | {topic_of(StarSpots), topic_of(StarPicture)},
-    ImagePolicy.SPOTS: _IMAGES,
-    ImagePolicy.LOSSLESS: frozenset[Topic](),
+_KEPT = {
+    Recorded.ALWAYS: frozenset(ImagePolicy),
+    Recorded.SPOTS: frozenset({ImagePolicy.SPOTS, ImagePolicy.LOSSLESS}),
+    Recorded.IMAGES: frozenset({ImagePolicy.LOSSLESS}),
 }
 
 
 def is_kept(topic: Topic, policy: ImagePolicy) -> bool:
     """Whether a recorder with this policy writes the topic."""
-    return topic not in _DROPPED[policy]
+    return policy in _KEPT[topic.recorded]

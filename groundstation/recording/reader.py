@@ -18,13 +18,13 @@ from mcap.reader import SeekingReader
 from mcap.records import ChunkIndex
 from mcap.summary import Summary
 
+from groundstation.bus.cdr import CodecError
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import Topic
-from groundstation.messages.base import Message
-from groundstation.messages.cdr import CodecError
+from groundstation.declarations.message import Message
+from groundstation.declarations.topic import Topic
 from groundstation.recording.channels import parse_channel
 from groundstation.recording.errors import RecordingError
-from groundstation.recording.info import METADATA_NAME, RecordingInfo
+from groundstation.recording.info import FORMAT, METADATA_NAME, RecordingInfo
 from groundstation.recording.records import (
     MESSAGE,
     RECORD,
@@ -33,6 +33,7 @@ from groundstation.recording.records import (
     complete_records,
     read_chunk,
 )
+from groundstation.recording.schemas import Decode, decoder_of
 
 # what the library lets through when it meets the torn or garbled end of a file
 _UNREADABLE = (McapError, EOFError, ValueError, KeyError, OverflowError, OSError, struct.error)
@@ -50,23 +51,25 @@ class Recorded(NamedTuple):
             (``wall_ns``, ``cpu_ns``, causes) stands in the journal.
         data: CDR bytes of the payload.
         log_ns: Log time.
+        decode: Makes the payload of its class by the file's own schema.
     """
 
     envelope: Envelope
     data: bytes
     log_ns: int
+    decode: Decode
 
     @property
     def payload(self) -> Message:
         """The payload, decoded anew at each call; CodecError if the bytes are no such payload."""
-        return self.envelope.topic.codec.decode(self.data)
+        return self.decode(self.data)
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedChannel:
     """A channel and how much it holds."""
 
-    topic: Topic
+    noun: str
     owner: str
     count: int
 
@@ -79,7 +82,7 @@ class Recording:
 
     Attributes:
         info: What the recording says about itself.
-        channels: Channels of the topic table, in the order of the table, then by owner.
+        channels: By noun, then by owner.
         start_ns: First log time, 0 if empty.
         stop_ns: Last log time, 0 if empty.
 
@@ -103,22 +106,23 @@ class Recording:
         counts = statistics.channel_message_counts if statistics is not None else {}
         self.start_ns = statistics.message_start_time if statistics is not None else 0
         self.stop_ns = statistics.message_end_time if statistics is not None else 0
-        self._known: dict[int, tuple[Topic, str]] = {}
+        self._known: dict[int, tuple[str, str, str]] = {}
         found = []
         for number, channel in self._summary.channels.items():
-            parsed = parse_channel(channel.topic)
-            if parsed is not None and channel.message_encoding == "cdr":
-                self._known[number] = parsed
-                found.append(RecordedChannel(*parsed, counts.get(number, 0)))
-        self.channels = tuple(sorted(found, key=lambda channel: (channel.topic.index, channel.owner)))
+            noun, owner = parse_channel(channel.topic)
+            schema = self._summary.schemas.get(channel.schema_id)
+            if schema is not None and channel.message_encoding == "cdr":
+                self._known[number] = noun, owner, schema.data.decode(errors="replace")
+                found.append(RecordedChannel(noun, owner, counts.get(number, 0)))
+        self.channels = tuple(sorted(found, key=lambda channel: (channel.noun, channel.owner)))
 
-    def has(self, topic: Topic, owner: str) -> bool:
-        """Whether anything of this topic of this owner was recorded."""
-        return any(c.topic is topic and c.owner == owner and c.count for c in self.channels)
+    def has(self, kind: type[Message], owner: str) -> bool:
+        """Whether anything of a class of payloads of this owner was recorded."""
+        return any(c.noun == kind.TOPIC.noun and c.owner == owner and c.count for c in self.channels)
 
     def messages(
         self,
-        topics: Collection[Topic] | None = None,
+        kinds: Collection[type[Message]],
         owners: Collection[str] | None = None,
         start_ns: int | None = None,
         stop_ns: int | None = None,
@@ -126,18 +130,24 @@ class Recording:
         """Messages in log order; equal log times in the order of the file.
 
         Args:
-            topics: Only these; None for all.
+            kinds: Classes of payloads; the file's own schemas say how their bytes are read.
             owners: Only of these vehicles or processes; None for all.
             start_ns: From this log time on.
             stop_ns: Before this log time.
 
         Raises:
-            RecordingError: A chunk of the file is damaged.
+            RecordingError: A chunk of the file is damaged, or a payload of today has a field that the
+                file lacks.
         """
+        by_noun = {kind.TOPIC.noun: kind for kind in kinds}
         wanted = {
-            number: (topic, owner)
-            for number, (topic, owner) in self._known.items()
-            if (topics is None or topic in topics) and (owners is None or owner in owners)
+            number: (
+                by_noun[noun].TOPIC,
+                owner,
+                decoder_of(by_noun[noun], schema, f"{self.path}: /{owner}/{noun}"),
+            )
+            for number, (noun, owner, schema) in self._known.items()
+            if noun in by_noun and (owners is None or owner in owners)
         }
         low = 0 if start_ns is None else start_ns
         high = 1 << 64 if stop_ns is None else stop_ns
@@ -165,14 +175,14 @@ class Recording:
             del pending[:ready]
 
     def delivered(
-        self, topics: Collection[Topic] | None = None, owners: Collection[str] | None = None
+        self, kinds: Collection[type[Message]], owners: Collection[str] | None = None
     ) -> Iterator[Delivered]:
         """Decoded messages in log order.
 
         Raises:
             RecordingError: A payload or a chunk of the file is damaged.
         """
-        for message in self.messages(topics, owners):
+        for message in self.messages(kinds, owners):
             try:
                 yield Delivered(message.envelope, message.payload)
             except CodecError as error:
@@ -204,9 +214,12 @@ class Recording:
             ) from error
         if summary is None:
             raise RecordingError(f"{self.path} has no index: try `groundstation recording recover`")
-        return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {}))
+        try:
+            return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {"format": str(FORMAT)}))
+        except RecordingError as error:
+            raise RecordingError(f"{self.path}: {error}") from error
 
-    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str]]) -> list[Recorded]:
+    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str, Decode]]) -> list[Recorded]:
         try:
             if index.chunk_start_offset + index.chunk_length > self._size:
                 raise DamagedChunkError("a chunk is said to lie behind the end of the file")
@@ -224,5 +237,5 @@ class Recording:
                 key = wanted.get(number)
                 if key is not None:
                     envelope = Envelope(key[0], key[1], sequence, publish_ns)
-                    found.append(Recorded(envelope, data[start + MESSAGE.size : stop], log_ns))
+                    found.append(Recorded(envelope, data[start + MESSAGE.size : stop], log_ns, key[2]))
         return found

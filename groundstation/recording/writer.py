@@ -1,4 +1,4 @@
-"""The recorder: every topic of the table into one MCAP file that viewers and replay can open.
+"""The recorder: every topic into one MCAP file that viewers and replay can open.
 
 Profile ``ros2``, schemas ``ros2msg``, messages ``cdr``. Messages gather in chunks that are closed after
 1 MiB or a quarter of a second, whichever comes first: what a killed recorder can lose is the open chunk,
@@ -8,15 +8,18 @@ Nothing here reads a clock, so that two equal runs in virtual time give equal by
 """
 
 import os
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
 
 from mcap.writer import CompressionType, Writer
 
+from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import Topic
-from groundstation.messages.ros_schema import ENCODING, schema_text
+from groundstation.bus.record_stream import Recorded
+from groundstation.bus.ros_schema import ENCODING, schema_text
+from groundstation.declarations.message import Message
 from groundstation.recording.channels import channel_name
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
@@ -57,8 +60,9 @@ class Recorder:
         self._flush_period_ns = flush_period_ns
         self._durable = durable
         self._flush_due_ns: int | None = None
-        self._channels: dict[tuple[int, str], int | None] = {}  # by topic row and owner
-        self._schemas: dict[int, int] = {}
+        self._channels: dict[tuple[str, str], int | None] = {}  # by noun and owner
+        self._schemas: dict[str, int] = {}
+        self._latched: dict[tuple[str, str], tuple[int, int]] = {}
         self._file: BinaryIO | None = _open_new(path, self.part_path)
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2", library=software())
@@ -73,15 +77,45 @@ class Recorder:
             now_ns: Log time: arrival at the recorder live, moment of publication in lockstep.
         """
         envelope = delivered.envelope
-        channel = self._channel(envelope.topic, envelope.vehicle)
+        kind = type(delivered.payload)
+        channel = self._channel(kind, envelope.owner)
         if channel is not None:
-            self._add(channel, envelope, envelope.topic.codec.encode(delivered.payload), now_ns)
+            data = codec_of(kind).encode(delivered.payload)
+            self._add(channel, envelope.sequence, envelope.publish_ns, data, now_ns)
 
-    def record_encoded(self, envelope: Envelope, data: bytes, log_ns: int) -> None:
-        """Write one message whose payload is already in CDR, as it came from the bus."""
-        channel = self._channel(envelope.topic, envelope.vehicle)
+    def record_encoded(self, kind: type[Message], envelope: Envelope, data: bytes, log_ns: int) -> None:
+        """Write one message whose payload is already in CDR."""
+        channel = self._channel(kind, envelope.owner)
         if channel is not None:
-            self._add(channel, envelope, data, log_ns)
+            self._add(channel, envelope.sequence, envelope.publish_ns, data, log_ns)
+
+    def record_batch(self, messages: Iterable[Recorded], payloads: Mapping[str, type[Message]]) -> int:
+        """Write messages of the record stream; their log time is that of their publication.
+
+        Latched messages that are repeated for late joiners are written once.
+
+        Args:
+            messages: Of a batch.
+            payloads: Payload classes by noun.
+
+        Returns:
+            How many were none of these and are not written.
+        """
+        unknown = 0
+        for message in messages:
+            noun, owner, sequence, publish_ns = message[:4]
+            kind = payloads.get(noun)
+            if kind is None:
+                unknown += 1
+                continue
+            if kind.TOPIC.latched:
+                if self._latched.get((noun, owner)) == (sequence, publish_ns):
+                    continue
+                self._latched[noun, owner] = sequence, publish_ns
+            channel = self._channel(kind, owner)
+            if channel is not None:
+                self._add(channel, sequence, publish_ns, message.data, publish_ns)
+        return unknown
 
     def tick(self, now_ns: int) -> None:
         """Time passed without a message: close the chunk if it is due. The clock is that of the log times."""
@@ -114,9 +148,9 @@ class Recorder:
     ) -> None:
         self.finish()
 
-    def _add(self, channel: int, envelope: Envelope, data: bytes, log_ns: int) -> None:
+    def _add(self, channel: int, sequence: int, publish_ns: int, data: bytes, log_ns: int) -> None:
         self._writer.add_message(
-            channel, log_time=log_ns, data=data, publish_time=envelope.publish_ns, sequence=envelope.sequence
+            channel, log_time=log_ns, data=data, publish_time=publish_ns, sequence=sequence
         )
         self.message_count += 1
         if self._flush_due_ns is None:
@@ -130,25 +164,24 @@ class Recorder:
         if self._durable and self._file is not None:
             os.fsync(self._file.fileno())
 
-    def _channel(self, topic: Topic, owner: str) -> int | None:
+    def _channel(self, kind: type[Message], owner: str) -> int | None:
         """Channel of a topic of an owner, registered at first use; None if the policy drops it."""
-        key = (topic.index, owner)
+        key = (kind.TOPIC.noun, owner)
         try:
             return self._channels[key]
         except KeyError:
             pass
-        channel = self._register(topic, owner) if is_kept(topic, self._images) else None
+        channel = self._register(kind, owner) if is_kept(kind.TOPIC, self._images) else None
         self._channels[key] = channel
         return channel
 
-    def _register(self, topic: Topic, owner: str) -> int:
-        schema = self._schemas.get(topic.index)
+    def _register(self, kind: type[Message], owner: str) -> int:
+        noun = kind.TOPIC.noun
+        schema = self._schemas.get(noun)
         if schema is None:
-            text = schema_text(topic.payload).encode()
-            schema = self._schemas[topic.index] = self._writer.register_schema(
-                topic.payload.ROS_TYPE, ENCODING, text
-            )
-        return self._writer.register_channel(channel_name(topic, owner), "cdr", schema)
+            text = schema_text(kind).encode()
+            schema = self._schemas[noun] = self._writer.register_schema(kind.ROS_TYPE, ENCODING, text)
+        return self._writer.register_channel(channel_name(noun, owner), "cdr", schema)
 
 
 def _open_new(path: Path, part_path: Path) -> BinaryIO:

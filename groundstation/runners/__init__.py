@@ -1,1 +1,1 @@
-"""Runners, node table, rig files, launcher and supervision."""
+"""Three runners of the same nodes: live, lockstep and replay; what they have in common stands in ``step``."""

@@ -1,7 +1,8 @@
 """The live runner: one process, one loop, one queue; wall clock and Zenoh.
 
-Threads only read devices or the bus and append to the queue; nodes run in the loop. What nodes of one
-process say to each other never leaves it before they have heard it, and goes out on the bus besides.
+Threads only read devices or the bus and append to the queue; nodes run in the loop. Messages inside a process
+are delivered directly. On its own key a topic goes out at once, for the processes that subscribe to it; all
+that is published goes out once more in the record stream.
 """
 
 import heapq
@@ -9,33 +10,39 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import zenoh
 
+from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import TOPICS, Recorded, Scope, topic_named, topic_of
-from groundstation.bus.zenoh_bus import ZenohBus, key_of, split_key
-from groundstation.messages.base import Message
-from groundstation.messages.cdr import CodecError
-from groundstation.messages.definitions import Diagnostics, Journal
-from groundstation.runtime.live_inbox import FromPort, Inbox, Remote
-from groundstation.runtime.live_ports import PortThread
-from groundstation.runtime.ports import PortTranslation
-from groundstation.runtime.slot import Dispatch, NodeSlot, Sequences, owner_of
-from groundstation.runtime.turns import Turns
+from groundstation.bus.journal import JournalWriter
+from groundstation.bus.listener import Decoder, Remote
+from groundstation.bus.record_stream import RecordWriter
+from groundstation.bus.zenoh_bus import TopicPublisher, ZenohBus, key_of, split_key
+from groundstation.declarations.message import Message
+from groundstation.declarations.port import Edge, Port
+from groundstation.declarations.topic import Delivery, Scope
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.recording.policy import ImagePolicy, is_kept
+from groundstation.runners.live_inbox import FromPort, Inbox
+from groundstation.runners.live_ports import PortThread
+from groundstation.runners.record_sender import RecordSender
+from groundstation.runners.slot import Sequences, Slot
+from groundstation.runners.step import JOURNAL_PERIOD_NS, Step
 
-JOURNAL_PERIOD_NS = 100_000_000
 LATCH_PERIOD_NS = 1_000_000_000
+RECORD_PERIOD_NS = 20_000_000
+RECORD_BYTES = 1 << 20
+"""A batch is sent at the latest when it has this size."""
 
 
 @dataclass(slots=True)
 class _Ticking:
     """When a node is to be ticked next."""
 
-    slot: NodeSlot
+    slot: Slot
     period_ns: int
     due_ns: int
 
@@ -51,50 +58,57 @@ class LiveProcess:
 
     Args:
         process: Its name.
-        slots: Its nodes, in the order of the node table.
+        slots: Its nodes, in the order of the tables.
         ports: Its edges with their addresses resolved.
         bus: Session with the hub.
+        payloads: Payload classes by noun.
         journal: Shared with the slots.
         sequences: Shared with the slots.
-        publish_images: Whether camera frames go out on the bus (recorded losslessly).
+        images: What of the cameras is recorded.
+        is_done: Asked after ticks; True ends the process.
     """
 
     def __init__(
         self,
         process: str,
-        slots: list[NodeSlot],
-        ports: Iterable[PortTranslation],
+        slots: list[Slot],
+        ports: Iterable[Port],
         bus: ZenohBus,
+        payloads: Mapping[str, type[Message]],
         journal: JournalWriter,
         sequences: Sequences,
         *,
-        publish_images: bool,
+        images: ImagePolicy,
+        is_done: Callable[[], bool] = lambda: False,
     ) -> None:
         self._process = process
-        self._slots = slots
         self._bus = bus
-        self._journal = journal
-        self._sequences = sequences
-        self._publish_images = publish_images
-        self._dispatch = Dispatch(slots)
-        self._turns = Turns(self._publish, self._hold)
+        self._payloads = payloads
+        self._images = images
+        self._is_done = is_done
+        self._decoder = Decoder(payloads)
         self._inbox = Inbox()
         self._stopping = threading.Event()
-        self._seen_latched: dict[str, tuple[int, int]] = {}
-        self._latched: dict[str, tuple[Envelope, bytes]] = {}
+        self._publishers: dict[tuple[str, str], TopicPublisher] = {}
+        self._latched: dict[tuple[str, str], tuple[Envelope, bytes]] = {}
+        self._record = RecordWriter()
+        self._sender = RecordSender(bus, process)
+        self._record_due_ns = 0
         self._local: deque[Delivered] = deque()
-        self._held: list[tuple[int, int, Delivered | NodeSlot]] = []
+        self._held: list[tuple[int, int, Delivered | Slot]] = []
         self._held_count = 0
-        self.undecodable = 0
         self._hub_is_gone = False
-        self._threads = [
-            PortThread(port, self._from_port, self._port_trouble, self._inbox.fail) for port in ports
-        ]
-        self._writers = {
-            (topic_of(kind).index, vehicle): thread
-            for thread in self._threads
-            for kind, vehicle in thread.port.writes()
+        self._threads = {
+            port.channel: PortThread(port, self._from_port, self._port_trouble, self._inbox.fail)
+            for port in ports
         }
+        own = [thread.port for thread in self._threads.values()]
+        self._step = Step(process, slots, own, journal, sequences, self)
+
+    @property
+    def undecodable(self) -> int:
+        """Messages from the bus that were none of ours."""
+        return self._decoder.undecodable
 
     def stop(self) -> None:
         """Ask the loop to end; safe in a signal handler and from any thread."""
@@ -102,7 +116,7 @@ class LiveProcess:
         self._inbox.wake()
 
     def run(self) -> None:
-        """Run until ``stop``; nodes then have their last words and ports are closed, whatever happened."""
+        """Run until ``stop``; nodes then give their last messages and ports are closed, whatever happened."""
         try:
             self._run()
         finally:
@@ -111,21 +125,22 @@ class LiveProcess:
     def _run(self) -> None:
         self._subscribe()
         now_ns = time.monotonic_ns()
-        for slot in self._slots:
-            self._publish(slot.start(now_ns))
+        self._step.start(now_ns)
         self._drain()
-        for thread in self._threads:
+        for thread in self._threads.values():
             thread.start()
         self._bus.announce(self._process)
         ticks = [
             _Ticking(slot, slot.node.tick_period_ns, now_ns + slot.node.tick_period_ns)
-            for slot in self._slots
+            for slot in self._step.slots
             if slot.node.tick_period_ns
         ]
-        next_journal_ns, next_latch_ns = now_ns + JOURNAL_PERIOD_NS, now_ns + LATCH_PERIOD_NS
+        next_journal_ns, next_latch_ns = now_ns, now_ns + LATCH_PERIOD_NS
         while not self._stopping.is_set():
             due_ns = min((tick.due_ns for tick in ticks), default=next_journal_ns)
             due_ns = min(due_ns, next_journal_ns)
+            if len(self._record):
+                due_ns = min(due_ns, self._record_due_ns)
             if self._held:
                 due_ns = min(due_ns, self._held[0][0])
             self._take(due_ns)
@@ -134,41 +149,47 @@ class LiveProcess:
             for tick in ticks:
                 if tick.due_ns <= now_ns:
                     told_ns = time.monotonic_ns()  # a node is never told an earlier moment than before
-                    self._publish(tick.slot.tick(told_ns))
+                    self._step.tick(tick.slot, told_ns)
                     self._drain()
                     tick.advance(told_ns)
+                    if self._is_done():
+                        self.stop()
             if now_ns >= next_journal_ns:
-                self._publish_journal(now_ns)
+                self._send(self._step.take_journal(now_ns))
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS
             if now_ns >= next_latch_ns:
-                for envelope, encoded in self._latched.values():
-                    self._put(envelope, encoded)
+                self._repeat_latched()
                 next_latch_ns = now_ns + LATCH_PERIOD_NS
+            if now_ns >= self._record_due_ns or self._record.size > RECORD_BYTES:
+                self._flush(now_ns)
 
     # -- in ---------------------------------------------------------------------------------------
 
     def _subscribe(self) -> None:
         made_here = {
-            (topic_of(kind).index, slot.node.vehicle)
-            for slot in self._slots
+            (kind.TOPIC.noun, slot.node.vehicle)
+            for slot in self._step.slots
             for kind in slot.node.outputs
-            if topic_of(kind).scope is Scope.VEHICLE
+            if kind.TOPIC.scope is Scope.VEHICLE
         }
-        made_here |= {(topic_of(t.port.reads).index, t.port.vehicle) for t in self._threads}
+        ports = (thread.port for thread in self._threads.values())
+        made_here |= {(port.reads.TOPIC.noun, port.vehicle) for port in ports}
         keys = set()
-        for index, vehicle in self._dispatch.topics():
-            topic = TOPICS[index]
+        for noun, vehicle in self._step.received:
+            topic = self._payloads[noun].TOPIC
             if topic.scope is Scope.PROCESS:
-                keys.add(f"*/{topic.noun}")
-            elif (index, vehicle) not in made_here:
+                keys.add(f"*/{noun}")
+            elif (noun, vehicle) not in made_here:
                 keys.add(key_of(topic, vehicle))
         for key in sorted(keys):
             self._bus.subscribe(key, self._from_bus)
 
     def _from_bus(self, key: str, payload: bytes, attachment: bytes) -> None:
-        self._inbox.put(key, Remote(key, payload, attachment), topic_named(split_key(key)[1]).delivery)
+        kind = self._payloads.get(split_key(key)[1])
+        delivery = Delivery.EVERY if kind is None else kind.TOPIC.delivery
+        self._inbox.put(key, Remote(key, payload, attachment), delivery)
 
-    def _from_port(self, port: PortTranslation, stamp_ns: int, data: object) -> None:
+    def _from_port(self, port: Port, stamp_ns: int, data: object) -> None:
         self._inbox.put(port.channel, FromPort(port, stamp_ns, data), port.delivery)
 
     def _take(self, due_ns: int) -> None:
@@ -179,9 +200,11 @@ class LiveProcess:
         match taken.item:
             case Remote() as remote:
                 self._note_replaced(remote.key, taken.replaced)
-                self._remote(remote)
+                delivered = self._decoder.decode(remote)
+                if delivered is not None and delivered.envelope.owner != self._process:
+                    self._step.receive(delivered, time.monotonic_ns())
             case FromPort(port, stamp_ns, data):
-                self._publish_from_port(port.to_message(stamp_ns, data))
+                self._step.arrive(port, stamp_ns, data, time.monotonic_ns())
         self._drain()
 
     def _note_replaced(self, key: str, attachments: list[bytes]) -> None:
@@ -189,81 +212,90 @@ class LiveProcess:
         now_ns = time.monotonic_ns()
         owner, noun = split_key(key)
         for attachment in attachments:
-            topic = topic_named(noun)
-            for slot in self._dispatch.topics().get((topic.index, owner), ()):
-                slot.drop(Envelope.unpack(topic, owner, attachment), now_ns)
+            envelope = self._decoder.envelope(Remote(key, b"", attachment))
+            for slot in self._step.received.get((noun, owner), ()):
+                if envelope is not None:
+                    slot.drop(envelope, now_ns)
 
-    def _remote(self, item: Remote) -> None:
-        owner, noun = split_key(item.key)
-        topic = topic_named(noun)
-        if owner == self._process:
-            return  # a session hears its own puts
-        try:
-            envelope = Envelope.unpack(topic, owner, item.attachment)
-            payload = topic.codec.decode(item.payload)
-        except (CodecError, ValueError):
-            self.undecodable += 1
-            return
-        if topic.latched:
-            key = f"{item.key} {payload.vehicle}"
-            said = (envelope.sequence, envelope.publish_ns)
-            if self._seen_latched.get(key) == said:
-                return
-            self._seen_latched[key] = said
-        self._local.append(Delivered(envelope, payload))
+    # -- what the step asks for -------------------------------------------------------------------
+
+    def publish(self, delivered: Delivered) -> None:
+        """Send now, or when the rig's emulated latency has passed; see ``Transport``."""
+        if delivered.envelope.publish_ns > time.monotonic_ns():
+            self._hold(delivered.envelope.publish_ns, delivered)
+        else:
+            self._send_and_keep(delivered)
+
+    def call_back(self, stamp_ns: int, slot: Slot) -> None:
+        """See ``Transport``."""
+        self._hold(stamp_ns, slot)
+
+    def write(self, port: Port, payload: Message, now_ns: int) -> None:
+        """See ``Transport``."""
+        del now_ns
+        self._threads[port.channel].write(payload)
 
     # -- out --------------------------------------------------------------------------------------
 
-    def _publish(self, messages: Iterable[Delivered]) -> None:
-        """Put on the bus and before the local nodes, now or when the rig's emulated latency has passed."""
-        now_ns = time.monotonic_ns()
-        for delivered in messages:
-            if delivered.envelope.publish_ns > now_ns:
-                self._hold(delivered.envelope.publish_ns, delivered)
-            else:
-                self._send(delivered)
-
-    def _send(self, delivered: Delivered) -> None:
-        envelope, payload = delivered
-        topic = envelope.topic
-        if topic.recorded is Recorded.ALWAYS or self._publish_images:
-            encoded = topic.codec.encode(payload)
-            self._put(envelope, encoded)
-            if topic.latched:
-                self._latched[f"{envelope.vehicle}/{topic.noun}"] = (envelope, encoded)
-        writer = self._writers.get((topic.index, payload.vehicle))
-        if writer is not None:
-            writer.write(payload)
+    def _send_and_keep(self, delivered: Delivered) -> None:
+        self._send(delivered)
         self._local.append(delivered)
 
-    def _put(self, envelope: Envelope, encoded: bytes) -> None:
+    def _send(self, delivered: Delivered) -> None:
+        """Put a message into the record stream, and on its own key where somebody subscribes."""
+        envelope, payload = delivered
+        topic, owner = envelope[:2]
+        publisher = self._publishers.get((topic.noun, owner))
+        if publisher is None:
+            publisher = self._publishers[topic.noun, owner] = self._bus.publisher(topic, owner)
+        kept = is_kept(topic, self._images)
+        if not kept and not publisher.is_wanted:
+            return
+        encoded = codec_of(type(payload)).encode(payload)
+        if publisher.is_wanted:
+            self._put(publisher, envelope, encoded)
+        if topic.latched:
+            self._latched[topic.noun, owner] = envelope, encoded
+        if kept:
+            self._record.add(envelope, encoded)
+
+    def _put(self, publisher: TopicPublisher, envelope: Envelope, encoded: bytes) -> None:
         """Hand to the bus; the loop goes on without it, since valves and ports are closed from here."""
         if self._hub_is_gone:
             return
         try:
-            self._bus.publish(envelope, encoded)
+            publisher.put(encoded, envelope.attachment())
         except zenoh.ZError as error:
+            self._lose_hub(str(error))
+
+    def _repeat_latched(self) -> None:
+        """For late joiners, of the topics and of the record stream."""
+        for key, (envelope, encoded) in self._latched.items():
+            publisher = self._publishers[key]
+            if publisher.is_wanted:
+                self._put(publisher, envelope, encoded)
+            self._record.add(envelope, encoded)
+
+    def _flush(self, now_ns: int) -> None:
+        self._record_due_ns = now_ns + RECORD_PERIOD_NS
+        if len(self._record):
+            self._sender.send(self._record)
+        if self._sender.is_broken:
+            self._lose_hub("the record stream cannot be sent")
+
+    def _lose_hub(self, why: str) -> None:
+        if not self._hub_is_gone:
             self._hub_is_gone = True
-            sys.stderr.write(f"the hub is gone, ending: {error}\n")
+            sys.stderr.write(f"the hub is gone, ending: {why}\n")
             self.stop()
 
-    def _publish_from_port(self, payload: Message) -> None:
-        topic = topic_of(type(payload))
-        owner = owner_of(topic, payload, self._process)
-        sequence = self._sequences.next(topic, owner)
-        now_ns = time.monotonic_ns()
-        self._journal.note(Kind.PORT, None, topic.index, owner, sequence, now_ns)
-        self._send(Delivered(Envelope(topic, owner, sequence, now_ns), payload))
-
     def _drain(self) -> None:
-        """Deliver until no local node has anything to hear."""
+        """Deliver until no local node has anything to receive."""
         local = self._local
         while local:
-            delivered = local.popleft()
-            for slot in self._dispatch.hearers(delivered.envelope.topic, delivered.payload):
-                self._turns.offer(slot, delivered, time.monotonic_ns())
+            self._step.deliver(local.popleft(), time.monotonic_ns())
 
-    def _hold(self, stamp_ns: int, what: Delivered | NodeSlot) -> None:
+    def _hold(self, stamp_ns: int, what: Delivered | Slot) -> None:
         self._held_count += 1
         heapq.heappush(self._held, (stamp_ns, self._held_count, what))
 
@@ -271,44 +303,45 @@ class LiveProcess:
         while self._held and self._held[0][0] <= now_ns:
             _, _, what = heapq.heappop(self._held)
             if isinstance(what, Delivered):
-                self._send(what)
+                self._send_and_keep(what)
             else:
-                self._turns.free(what, now_ns)
+                self._step.free(what, now_ns)
             self._drain()
 
     def _port_trouble(self, channel: str, level: int, summary: str) -> None:
         """Called by port threads: a device opened, went away, or cannot be opened."""
-        port = _TroublePort(channel)
+        port = _TroublePort(channel, channel.rpartition("/")[0], None)
         self._inbox.put(channel, FromPort(port, time.monotonic_ns(), (level, summary)), port.delivery)
 
-    def _publish_journal(self, now_ns: int) -> None:
-        """An empty journal is said too: it is the process's sign of life."""
-        names, entries = self._journal.take()
-        topic = topic_of(Journal)
-        payload = Journal(now_ns, "", self._process, names, entries)
-        envelope = Envelope(topic, self._process, self._sequences.next(topic, self._process), now_ns)
-        self._put(envelope, topic.codec.encode(payload))
-
     def _end(self) -> None:
-        for slot in self._slots:
-            self._publish(slot.stop(time.monotonic_ns()))
+        for slot in self._step.slots:
+            self._step.stop(slot, time.monotonic_ns())
             self._drain()
-        for thread in self._threads:
+        while self._held:  # emulated latency does not outlive the process
+            _, _, what = heapq.heappop(self._held)
+            if isinstance(what, Delivered):
+                self._send_and_keep(what)
+                self._drain()
+        for thread in self._threads.values():
             thread.ask_to_end()
-        for thread in self._threads:
+        for thread in self._threads.values():
             thread.close()
-        self._publish_journal(time.monotonic_ns())
+        now_ns = time.monotonic_ns()
+        self._send(self._step.take_journal(now_ns))
+        self._flush(now_ns)
+        self._sender.close()
 
 
-class _TroublePort(PortTranslation):
-    """Turns what a port thread has to say about its device into a ``Diagnostics`` message."""
+@dataclass(frozen=True)
+class _TroublePort(Port):
+    """Turns what a port thread reports of its device into a ``Diagnostics`` message."""
 
     reads = Diagnostics
-
-    def __init__(self, channel: str) -> None:
-        super().__init__(channel, channel.rpartition("/")[0], None, "")
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, tuple)
         level, summary = data
         return Diagnostics(stamp_ns, self.vehicle, self.channel, level, summary, (), ())
+
+    def open(self) -> Edge:
+        raise TypeError(f"{self.channel} reports trouble and is opened by nobody")

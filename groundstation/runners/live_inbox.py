@@ -5,22 +5,15 @@ import threading
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from groundstation.bus.topics import Delivery
-from groundstation.runtime.ports import PortTranslation
-
-
-class Remote(NamedTuple):
-    """A message from the bus, not decoded yet."""
-
-    key: str
-    payload: bytes
-    attachment: bytes
+from groundstation.bus.listener import Remote
+from groundstation.declarations.port import Port
+from groundstation.declarations.topic import Delivery
 
 
 class FromPort(NamedTuple):
-    """What a device said, and when it arrived."""
+    """What a device delivered, and when it arrived."""
 
-    port: PortTranslation
+    port: Port
     stamp_ns: int
     data: object
 

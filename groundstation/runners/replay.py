@@ -1,26 +1,22 @@
 """The replay runner: the recording's stamps are the clock, its journal is the order of things.
 
 Each chosen node is built anew and told exactly what it was told then: started, handed the recorded
-inputs at the recorded moments, ticked, stopped. What it says is compared with what was recorded. One
+inputs at the recorded moments, ticked, stopped. What it publishes is compared with what was recorded. One
 pass over the file in log order; memory holds what lies between a message and its journal entry.
 """
 
 from collections import deque
 from collections.abc import Callable, Collection
 
-import numpy as np
-
-from groundstation.bus.journal import Kind, read_entries
-from groundstation.bus.topics import TOPICS, Topic, topic_of
-from groundstation.messages.definitions import Journal
-from groundstation.nodes.node import Node
+from groundstation.bus.journal import Journal, Kind, packed_entries, read_entries
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.node import Node
 from groundstation.recording.policy import is_kept
 from groundstation.recording.reader import Recorded, Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.replay_comparison import EXACT, Comparison, Tolerances
-from groundstation.runtime.replay_node import NodeFactory, ReplayedNode
-from groundstation.runtime.replay_report import ReplayReport
+from groundstation.runners.replay_comparison import EXACT, Comparison, Tolerances
+from groundstation.runners.replay_node import NodeFactory, ReplayedNode
+from groundstation.runners.replay_report import ReplayReport
 
 LOOK_AHEAD_NS = 2_000_000_000  # a recorder may log a message later than the process that consumed it
 
@@ -28,10 +24,10 @@ LOOK_AHEAD_NS = 2_000_000_000  # a recorder may log a message later than the pro
 def recorded_nodes(recording: Recording) -> tuple[str, ...]:
     """Keys of all nodes whose start is in the journal, sorted."""
     found: set[str] = set()
-    for message in recording.messages([topic_of(Journal)]):
+    for message in recording.messages([Journal]):
         journal = message.payload
         assert isinstance(journal, Journal)
-        entries = read_entries(journal.entries)
+        entries = packed_entries(journal)
         starts = entries["node"][entries["kind"] == Kind.START]
         found.update(journal.names[index] for index in starts.tolist())
     return tuple(sorted(found))
@@ -45,7 +41,7 @@ class ReplayRunner:
         factory: Makes a node of its key; called once per start in the journal.
         nodes: Keys of the nodes to replay; None for every node whose inputs were recorded.
         tolerances: What may differ; nothing by default.
-        output: Takes what the nodes say now; messages said only now carry sequence 0.
+        output: Takes what the nodes publish now; messages published only now carry sequence 0.
 
     Raises:
         UsageError: A node asked for is not in the journal, its inputs were not recorded, or nothing is
@@ -69,7 +65,13 @@ class ReplayRunner:
             if key not in present:
                 known = ", ".join(present) or "none"
                 raise UsageError(f"{recording.path}: no node {key!r} is in the journal (there: {known})")
-            node = factory(key)
+            try:
+                node = factory(key)
+            except KeyError:
+                if nodes is not None:
+                    raise UsageError(f"{recording.path}: {key!r} is no node of the rig") from None
+                refused[key] = f"{key} is no node of the rig: it ran beside it"
+                continue
             reason = self._why_not(key, node)
             if reason is None:
                 prepared[key] = node
@@ -84,11 +86,11 @@ class ReplayRunner:
         self._report = ReplayReport(tuple(prepared), refused)
         self._comparison = Comparison(tolerances, output)
         self._backlog: deque[Journal] = deque()
-        heard = {topic_of(kind) for node in prepared.values() for kind in node.inputs}
-        said = {topic_of(kind) for node in prepared.values() for kind in node.outputs}
-        self._said = {topic.index for topic in said}
-        self._queues: dict[tuple[int, str], list[deque[Recorded]]] = {}
-        self._stream = recording.messages(heard | said | {topic_of(Journal)})
+        received = {kind for node in prepared.values() for kind in node.inputs}
+        published = {kind for node in prepared.values() for kind in node.outputs}
+        self._published = {kind.TOPIC.noun for kind in published}
+        self._queues: dict[tuple[str, str], list[deque[Recorded]]] = {}
+        self._stream = recording.messages(received | published | {Journal})
         self._log_ns = 0
 
     def run(self, progress: Callable[[int], None] | None = None) -> ReplayReport:
@@ -111,10 +113,9 @@ class ReplayRunner:
 
     def _why_not(self, key: str, node: Node) -> str | None:
         for kind in node.inputs:
-            topic = topic_of(kind)
-            if not is_kept(topic, self._policy):
+            if not is_kept(kind.TOPIC, self._policy):
                 return (
-                    f"{key} cannot be replayed: it hears {topic.noun}, which this recording "
+                    f"{key} cannot be replayed: it receives {kind.TOPIC.noun}, which this recording "
                     f"does not keep (images = {self._policy.value!r})"
                 )
         return None
@@ -125,73 +126,65 @@ class ReplayRunner:
         if message is None:
             return False
         self._log_ns = message.log_ns
-        topic = message.envelope.topic
-        if topic.payload is Journal:
+        envelope = message.envelope
+        if envelope.topic.noun == Journal.TOPIC.noun:
             journal = message.payload
             assert isinstance(journal, Journal)
             self._backlog.append(journal)
-        key = (topic.index, message.envelope.vehicle)
+        key = (envelope.topic.noun, envelope.owner)
         queues = self._queues.get(key)
         if queues is None:
-            queues = self._queues[key] = self._hearers(topic, message.envelope.vehicle)
+            found = (node.queue_for(envelope) for node in self._replayed_nodes.values())
+            queues = self._queues[key] = [queue for queue in found if queue is not None]
         for queue in queues:
             queue.append(message)
-        if topic.index in self._said:
+        if envelope.topic.noun in self._published:
             self._comparison.recorded(message)
         return True
 
-    def _hearers(self, topic: Topic, owner: str) -> list[deque[Recorded]]:
-        found = (node.queue_for(topic, owner) for node in self._replayed_nodes.values())
-        return [queue for queue in found if queue is not None]
-
     def _follow(self, journal: Journal) -> None:
-        names = journal.names
-        nodes = [self._replayed_nodes.get(name) for name in names]
-        entries = read_entries(journal.entries)
-        wanted = [index for index, node in enumerate(nodes) if node is not None]  # never that of no node
-        chosen = np.isin(entries["node"], wanted) & (entries["kind"] != Kind.DROP)
-        for entry in entries[chosen].tolist():
-            now_ns, sequence, kind, topic_index, node_index, owner_index = entry[:6]
-            node = nodes[node_index]
-            assert node is not None
+        nodes = self._replayed_nodes
+        for now_ns, kind, key, noun, owner, sequence, _ in read_entries(journal):
+            node = nodes.get(key)
+            if node is None or kind == Kind.DROP:
+                continue
             if not node.is_started and kind != Kind.START:
                 self._report.before_start += 1  # of an earlier life, whose start the recording missed
                 continue
             if kind == Kind.OUTPUT:
-                self._expect(node, TOPICS[topic_index], names[owner_index], sequence)
+                self._expect(node, noun, owner, sequence)
                 continue
             self._leave(node)
             if kind == Kind.START:
                 self._report.config_crcs[node.key] = sequence
-                node.begin(self._factory, journal.process)
-                node.take(node.node.start(now_ns), now_ns)
+                node.start(self._factory, journal.process, now_ns)
             elif kind == Kind.INPUT:
-                self._hand_over(node, topic_index, names[owner_index], sequence, now_ns)
+                self._hand_over(node, noun, owner, sequence, now_ns)
             elif kind == Kind.TICK:
                 self._report.ticks += 1
-                node.take(node.node.tick(now_ns), now_ns)
+                node.tick(now_ns)
             elif kind == Kind.STOP:
-                node.take(node.node.stop(now_ns), now_ns)
+                node.stop(now_ns)
 
-    def _hand_over(self, node: ReplayedNode, index: int, owner: str, sequence: int, now_ns: int) -> None:
-        while (found := node.find(index, owner, sequence)) is None:
+    def _hand_over(self, node: ReplayedNode, noun: str, owner: str, sequence: int, now_ns: int) -> None:
+        while (found := node.find(noun, owner, sequence)) is None:
             if self._log_ns > now_ns + LOOK_AHEAD_NS or not self._pull():
-                name = f"{node.key} <- {TOPICS[index].noun}"
+                name = f"{node.key} <- {noun}"
                 self._report.missing_inputs[name] = self._report.missing_inputs.get(name, 0) + 1
                 return
         self._report.inputs += 1
-        node.take(node.node.receive(found.payload, now_ns), now_ns)
+        node.receive(found, now_ns)
 
-    def _expect(self, node: ReplayedNode, topic: Topic, owner: str, sequence: int) -> None:
-        """The journal says that the node said this next."""
-        if node.said:
-            payload, said_ns = node.said.popleft()
-            self._comparison.replayed(topic, owner, sequence, payload, said_ns)
+    def _expect(self, node: ReplayedNode, noun: str, owner: str, sequence: int) -> None:
+        """The journal says that the node published this next."""
+        if node.published:
+            payload, told_ns = node.published.popleft()
+            self._comparison.replayed(noun, owner, sequence, payload, told_ns)
         else:
-            self._comparison.missing(topic, owner)
+            self._comparison.missing(noun, owner)
 
     def _leave(self, node: ReplayedNode) -> None:
         """The node goes on to its next call: whatever of the last is not in the journal is new."""
-        while node.said:
-            payload, said_ns = node.said.popleft()
-            self._comparison.extra(node.owner_of(payload), payload, said_ns)
+        while node.published:
+            payload, told_ns = node.published.popleft()
+            self._comparison.extra(node.owner_of(payload), payload, told_ns)

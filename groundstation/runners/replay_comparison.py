@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from groundstation.bus.cdr import codec_of, ros_fields
 from groundstation.bus.envelope import Envelope
-from groundstation.bus.topics import TOPICS, Topic, topic_named, topic_of
-from groundstation.messages.base import Message
-from groundstation.messages.cdr import ros_fields
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recorded
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.errors import UsageError
-from groundstation.runtime.replay_report import Difference, TopicResult
+from groundstation.runners.replay_report import Difference, TopicResult
 
 Tolerances = Mapping[str, Mapping[str, float]]
 """Noun of a topic to field to the largest absolute difference, in the field's unit."""
@@ -28,26 +27,26 @@ FORGET_NS = 5_000_000_000  # recorded outputs that the journal has not claimed b
 
 
 class Comparison:
-    """Brings together what was said then and what is said now; they come in either order.
+    """Brings together what was published then and what is published now; they come in either order.
 
     Args:
         tolerances: What may differ.
-        output: Takes what is said now; messages said only now carry sequence 0.
+        output: Takes what is published now; messages published only now carry sequence 0.
     """
 
     def __init__(self, tolerances: Tolerances, output: Recorder | None) -> None:
         self._tolerances = tolerances
         self._output = output
-        self._results: dict[tuple[int, str], TopicResult] = {}
-        self._then: dict[tuple[int, str, int], Recorded] = {}
-        self._now: dict[tuple[int, str, int], tuple[Message, int]] = {}
+        self._results: dict[tuple[str, str], TopicResult] = {}
+        self._then: dict[tuple[str, str, int], Recorded] = {}
+        self._now: dict[tuple[str, str, int], tuple[Message, int]] = {}
         self._log_ns = 0
 
     def recorded(self, message: Recorded) -> None:
-        """The next message of the recording that a replayed node may have said."""
+        """The next message of the recording that a replayed node may have published."""
         self._log_ns = message.log_ns
         envelope = message.envelope
-        key = (envelope.topic.index, envelope.vehicle, envelope.sequence)
+        key = (envelope.topic.noun, envelope.owner, envelope.sequence)
         waiting = self._now.pop(key, None)
         if waiting is not None:
             self._compare(message, waiting[0])
@@ -57,48 +56,44 @@ class Comparison:
         if self._then[oldest].log_ns < self._log_ns - FORGET_NS:
             del self._then[oldest]
 
-    def replayed(self, topic: Topic, owner: str, sequence: int, payload: Message, now_ns: int) -> None:
-        """A node said this where the journal has (topic, owner, sequence)."""
-        said = topic_of(type(payload))
-        if said is not topic:
-            result = self._result(topic, owner)
+    def replayed(self, noun: str, owner: str, sequence: int, payload: Message, now_ns: int) -> None:
+        """A node published this where the journal has (noun, owner, sequence)."""
+        topic = payload.TOPIC
+        if topic.noun != noun:
+            result = self._result(noun, owner)
             result.different += 1
-            result.first = result.first or Difference(
-                sequence, payload.stamp_ns, "topic", topic.noun, said.noun
-            )
-            self._write(Envelope(said, owner, 0, now_ns), payload, now_ns)
+            result.first = result.first or Difference(sequence, payload.stamp_ns, "topic", noun, topic.noun)
+            self._write(Envelope(topic, owner, 0, now_ns), payload, now_ns)
             return
-        key = (topic.index, owner, sequence)
+        key = (noun, owner, sequence)
         message = self._then.pop(key, None)
         if message is None:
             self._now[key] = (payload, now_ns)
         else:
             self._compare(message, payload)
 
-    def missing(self, topic: Topic, owner: str) -> None:
-        """The journal has an output that the node did not say."""
-        self._result(topic, owner).missing += 1
+    def missing(self, noun: str, owner: str) -> None:
+        """The journal has an output that the node did not publish."""
+        self._result(noun, owner).missing += 1
 
     def extra(self, owner: str, payload: Message, now_ns: int) -> None:
-        """The node said something that is not in the journal."""
-        topic = topic_of(type(payload))
-        self._result(topic, owner).extra += 1
+        """The node published something that is not in the journal."""
+        topic = payload.TOPIC
+        self._result(topic.noun, owner).extra += 1
         self._write(Envelope(topic, owner, 0, now_ns), payload, now_ns)
 
     def finish(self) -> list[TopicResult]:
-        """Results in the order of the topic table; what found no recorded partner is counted."""
-        for (index, owner, sequence), (payload, now_ns) in self._now.items():
-            self._result(TOPICS[index], owner).unrecorded += 1
-            self._write(Envelope(TOPICS[index], owner, sequence, now_ns), payload, now_ns)
+        """Results by noun and owner; what found no recorded partner is counted."""
+        for (noun, owner, sequence), (payload, now_ns) in self._now.items():
+            self._result(noun, owner).unrecorded += 1
+            self._write(Envelope(payload.TOPIC, owner, sequence, now_ns), payload, now_ns)
         self._now.clear()
         return [self._results[key] for key in sorted(self._results)]
 
     def _compare(self, recorded: Recorded, replayed: Message) -> None:
         envelope = recorded.envelope
-        result = self._result(envelope.topic, envelope.vehicle)
-        equal, found = difference(
-            envelope.topic, envelope.sequence, recorded.data, replayed, self._tolerances
-        )
+        result = self._result(envelope.topic.noun, envelope.owner)
+        equal, found = difference(recorded, replayed, self._tolerances)
         if equal:
             result.equal += 1
         elif found is None:
@@ -108,45 +103,49 @@ class Comparison:
             result.first = result.first or found
         self._write(envelope, replayed, recorded.log_ns)
 
-    def _result(self, topic: Topic, owner: str) -> TopicResult:
-        key = (topic.index, owner)
-        if key not in self._results:
-            self._results[key] = TopicResult(topic.noun, owner)
-        return self._results[key]
+    def _result(self, noun: str, owner: str) -> TopicResult:
+        if (noun, owner) not in self._results:
+            self._results[noun, owner] = TopicResult(noun, owner)
+        return self._results[noun, owner]
 
     def _write(self, envelope: Envelope, payload: Message, log_ns: int) -> None:
         if self._output is not None:
-            self._output.record_encoded(envelope, envelope.topic.codec.encode(payload), log_ns)
+            kind = type(payload)
+            self._output.record_encoded(kind, envelope, codec_of(kind).encode(payload), log_ns)
 
 
 def difference(
-    topic: Topic, sequence: int, recorded: bytes, replayed: Message, tolerances: Tolerances
+    recorded: Recorded, replayed: Message, tolerances: Tolerances
 ) -> tuple[bool, Difference | None]:
     """Compare one payload.
 
     Args:
-        topic: Of both.
-        sequence: Of the recorded message.
-        recorded: CDR of the recorded payload.
-        replayed: What the node says now.
+        recorded: What was published then.
+        replayed: What the node publishes now.
         tolerances: What may differ.
 
     Returns:
         Whether they are equal bit for bit, and the first difference beyond the tolerances.
     """
-    if topic.codec.encode(replayed) == recorded:
+    if codec_of(type(replayed)).encode(replayed) == recorded.data:
         return True, None
-    then = topic.codec.decode(recorded)
-    allowed = tolerances.get(topic.noun, {})
+    then = recorded.payload
+    allowed = tolerances.get(replayed.TOPIC.noun, {})
     for field in fields(then):
         a, b = getattr(then, field.name), getattr(replayed, field.name)
         if _bits(a) != _bits(b) and not _close(a, b, allowed.get(field.name), field.name):
-            return False, Difference(sequence, then.stamp_ns, field.name, _short(a), _short(b))
+            return False, Difference(
+                recorded.envelope.sequence, then.stamp_ns, field.name, _short(a), _short(b)
+            )
     return False, None
 
 
-def load_tolerances(path: Path) -> Tolerances:
+def load_tolerances(path: Path, payloads: Mapping[str, type[Message]]) -> Tolerances:
     """Read tolerances: a TOML with one table per topic, ``field = largest absolute difference``.
+
+    Args:
+        path: Of the file.
+        payloads: Payload classes by noun.
 
     Raises:
         UsageError: The file cannot be read, or names a topic or field that does not exist.
@@ -157,7 +156,7 @@ def load_tolerances(path: Path) -> Tolerances:
         raise UsageError(f"{path}: cannot be read as tolerances ({error})") from error
     for noun, table in said.items():
         try:
-            known = dict(ros_fields(topic_named(noun).payload))
+            known = dict(ros_fields(payloads[noun]))
         except KeyError:
             raise UsageError(f"{path}: {noun!r} is no topic") from None
         if not isinstance(table, dict):

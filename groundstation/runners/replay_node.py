@@ -1,19 +1,22 @@
-"""One node under replay: what it may be handed next, and what it said last."""
+"""One node under replay: what it may be handed next, and what it published last."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from groundstation.bus.topics import Scope, Topic, topic_of
-from groundstation.messages.base import Message
-from groundstation.nodes.node import Node
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.journal import NoJournal
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.topic import Scope
 from groundstation.recording.reader import Recorded
+from groundstation.runners.slot import Sequences, Slot, owner_of
 
 NodeFactory = Callable[[str], Node]
 """Makes the node of a key, ``vehicle/name`` or ``name``, from the recording's rig."""
 
 
 class ReplayedNode:
-    """A node with queues of the recorded messages that it hears.
+    """A node, stepped through the same slot as in the other runners, with queues of what it receives.
 
     Args:
         key: Of the journal.
@@ -22,34 +25,53 @@ class ReplayedNode:
 
     def __init__(self, key: str, prepared: Node) -> None:
         self.key = key
-        self.node = prepared
         self.is_started = False
         self._process = ""
-        self.said: deque[tuple[Message, int]] = deque()
-        self._queues: dict[tuple[int, str], deque[Recorded]] = {}
-        self._heard = {topic_of(kind).index: kind for kind in prepared.inputs}
+        self._prepared = prepared
+        self._slot = self._slot_of(prepared)
+        self.published: deque[tuple[Message, int]] = deque()
+        self._queues: dict[tuple[str, str], deque[Recorded]] = {}
+        self._inputs = {kind.TOPIC.noun: kind for kind in prepared.inputs}
 
-    def begin(self, factory: NodeFactory, process: str) -> None:
+    @property
+    def node(self) -> Node:
+        """The node of the present life."""
+        return self._slot.node
+
+    def start(self, factory: NodeFactory, process: str, now_ns: int) -> None:
         """A start in the journal of ``process``; from the second on it had been started again."""
-        if self.is_started:
-            self.node = factory(self.key)
-        self.is_started = True
         self._process = process
+        self._slot = self._slot_of(factory(self.key) if self.is_started else self._prepared)
+        self.is_started = True
+        self._keep(self._slot.start(now_ns), now_ns)
+
+    def receive(self, message: Recorded, now_ns: int) -> None:
+        """Hand over what the node consumed."""
+        self._keep(self._slot.receive(Delivered(message.envelope, message.payload), now_ns), now_ns)
+
+    def tick(self, now_ns: int) -> None:
+        """Let time pass."""
+        self._keep(self._slot.tick(now_ns), now_ns)
+
+    def stop(self, now_ns: int) -> None:
+        """The process ended in good order."""
+        self._keep(self._slot.stop(now_ns), now_ns)
 
     def owner_of(self, payload: Message) -> str:
-        """Whose topic it is that the node spoke on."""
-        return self._process if topic_of(type(payload)).scope is Scope.PROCESS else payload.vehicle
+        """Whose topic it is that the node published on."""
+        return owner_of(payload.TOPIC, payload, self._process)
 
-    def queue_for(self, topic: Topic, owner: str) -> deque[Recorded] | None:
-        """Where recorded messages of a topic of an owner wait for this node; None if it is deaf to them."""
-        kind = self._heard.get(topic.index)
-        if kind is None or (topic.scope is Scope.VEHICLE and owner not in self.node.vehicles_heard(kind)):
+    def queue_for(self, envelope: Envelope) -> deque[Recorded] | None:
+        """Where recorded messages of a topic of an owner wait for this node; None if it takes none."""
+        noun, owner = envelope.topic.noun, envelope.owner
+        kind = self._inputs.get(noun)
+        if kind is None or (kind.TOPIC.scope is Scope.VEHICLE and owner not in self.node.sources(kind)):
             return None
-        return self._queues.setdefault((topic.index, owner), deque())
+        return self._queues.setdefault((noun, owner), deque())
 
-    def find(self, index: int, owner: str, sequence: int) -> Recorded | None:
+    def find(self, noun: str, owner: str, sequence: int) -> Recorded | None:
         """The message consumed; older ones are forgotten, itself is kept: a latched one may come again."""
-        queue = self._queues.get((index, owner), ())
+        queue = self._queues.get((noun, owner), ())
         for position, message in enumerate(queue):
             if message.envelope.sequence == sequence:
                 assert isinstance(queue, deque)
@@ -58,6 +80,8 @@ class ReplayedNode:
                 return message
         return None
 
-    def take(self, said: Iterable[Message], now_ns: int) -> None:
-        """Collect what a call of the node says."""
-        self.said.extend((payload, now_ns) for payload in said)
+    def _slot_of(self, node: Node) -> Slot:
+        return Slot(self.key, node, self._process, 0, NoJournal(), Sequences(), measure=False)
+
+    def _keep(self, made: Iterable[Delivered], now_ns: int) -> None:
+        self.published.extend((delivered.payload, now_ns) for delivered in made)

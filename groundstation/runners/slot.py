@@ -1,14 +1,14 @@
-"""A node in a runner: counts, journals and times what it does, the same in live and lockstep."""
+"""A node in a runner: what it consumes and publishes is counted, journaled and timed, in every runner."""
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from groundstation.bus.envelope import Cause, Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import Scope, Topic, topic_of
-from groundstation.messages.base import Message
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.topic import Scope, Topic
 
 
 @dataclass(slots=True)
@@ -29,11 +29,11 @@ class Sequences:
 
     def __init__(self, after: int = 0) -> None:
         self._after = after
-        self._streams: dict[tuple[int, str], Stream] = {}
+        self._streams: dict[tuple[str, str], Stream] = {}
 
     def stream(self, topic: Topic, owner: str) -> Stream:
         """The stream of a topic of an owner, shared by all who publish on it."""
-        return self._streams.setdefault((topic.index, owner), Stream(topic, owner, self._after))
+        return self._streams.setdefault((topic.noun, owner), Stream(topic, owner, self._after))
 
     def next(self, topic: Topic, owner: str) -> int:
         """The next number."""
@@ -61,7 +61,7 @@ class Timing:
 
 
 @dataclass(slots=True)
-class NodeSlot:
+class Slot:
     """One node with its place in a process.
 
     Attributes:
@@ -73,6 +73,8 @@ class NodeSlot:
         sequences: The counters of the process, shared by its slots.
         measure: Whether wall and CPU times are measured (not in lockstep: they would differ per run).
         timing: Emulated duration.
+        busy_until_ns: When a busy node is free again.
+        waiting: What waits for a busy node.
     """
 
     key: str
@@ -84,47 +86,51 @@ class NodeSlot:
     measure: bool
     timing: Timing = field(default_factory=Timing)
     busy_until_ns: int = 0
-    _newest: dict[int, int] = field(default_factory=dict)
+    waiting: list[Delivered] = field(default_factory=list)
+    _newest: dict[tuple[str, str], Cause] = field(default_factory=dict)
     _streams: dict[tuple[type[Message], str], Stream] = field(default_factory=dict)
+    _trigger: tuple[str, str] = ("", "")
+
+    def __post_init__(self) -> None:
+        trigger = self.node.trigger
+        if trigger is not None:
+            self._trigger = trigger.TOPIC.noun, self.node.vehicle
 
     def start(self, now_ns: int) -> list[Delivered]:
-        """Journal the start and collect what the node says first."""
-        self.journal.note(Kind.START, self.key, 0, self.process, self.config_crc, now_ns)
+        """Journal the start and collect what the node publishes first."""
+        self.journal.note(Kind.START, self.key, "", self.process, self.config_crc, now_ns)
         return self._wrap(self.node.start(now_ns), now_ns, None)
 
     def receive(self, delivered: Delivered, now_ns: int) -> list[Delivered]:
-        """Hand one message over; the outputs carry the stamps at which they are to be published."""
-        envelope = delivered.envelope
-        index = envelope.topic.index
-        self._newest[index] = envelope.sequence
-        self.journal.note(Kind.INPUT, self.key, index, envelope.vehicle, envelope.sequence, now_ns)
-        trigger = Cause(index, envelope.sequence)
-        return self._wrap(self.node.receive(delivered.payload, now_ns), now_ns, trigger)
+        """Deliver one message; the outputs carry the stamps at which they are to be published."""
+        topic, owner, sequence = delivered.envelope[:3]
+        noun = topic.noun
+        cause = self._newest[noun, owner] = Cause(noun, owner, sequence)
+        self.journal.note(Kind.INPUT, self.key, noun, owner, sequence, now_ns)
+        return self._wrap(self.node.receive(delivered.payload, now_ns), now_ns, cause)
 
     def tick(self, now_ns: int) -> list[Delivered]:
-        """Let time pass."""
-        self.journal.note(Kind.TICK, self.key, 0, self.process, 0, now_ns)
-        return self._wrap(self.node.tick(now_ns), now_ns, None)
+        """Let time pass; what is made then was triggered by the newest message of the node's trigger."""
+        self.journal.note(Kind.TICK, self.key, "", self.process, 0, now_ns)
+        return self._wrap(self.node.tick(now_ns), now_ns, self._newest.get(self._trigger))
 
     def stop(self, now_ns: int) -> list[Delivered]:
-        """Collect the node's last words."""
-        self.journal.note(Kind.STOP, self.key, 0, self.process, 0, now_ns)
+        """Collect the node's last messages."""
+        self.journal.note(Kind.STOP, self.key, "", self.process, 0, now_ns)
         return self._wrap(self.node.stop(now_ns), now_ns, None)
 
     def drop(self, envelope: Envelope, now_ns: int) -> None:
         """Journal that a newer message replaced this one before the node was free."""
-        self.journal.note(
-            Kind.DROP, self.key, envelope.topic.index, envelope.vehicle, envelope.sequence, now_ns
-        )
+        self.journal.note(Kind.DROP, self.key, envelope.topic.noun, envelope.owner, envelope.sequence, now_ns)
 
-    def _wrap(self, said: Iterable[Message], now_ns: int, trigger: Cause | None) -> list[Delivered]:
+    def _wrap(self, made: Iterable[Message], now_ns: int, trigger: Cause | None) -> list[Delivered]:
         wall_ns = cpu_ns = 0
         if self.measure:
             wall_start, cpu_start = time.perf_counter_ns(), time.thread_time_ns()
-            payloads = list(said)  # generators do their work here
+            payloads = list(made)  # generators do their work here
             wall_ns, cpu_ns = time.perf_counter_ns() - wall_start, time.thread_time_ns() - cpu_start
         else:
-            payloads = list(said)
+            payloads = list(made)
         if not payloads:
             return []
         publish_ns = now_ns + wall_ns + self.timing.busy_ns + self.timing.late_ns
@@ -134,7 +140,7 @@ class NodeSlot:
             stream = self._streams.get((type(payload), payload.vehicle)) or self._open(payload)
             stream.last += 1
             topic, owner, sequence = stream.topic, stream.owner, stream.last
-            self.journal.note(Kind.OUTPUT, self.key, topic.index, owner, sequence, now_ns, wall_ns)
+            self.journal.note(Kind.OUTPUT, self.key, topic.noun, owner, sequence, now_ns, wall_ns)
             envelope = Envelope(topic, owner, sequence, publish_ns, wall_ns, cpu_ns, causes)
             out.append(Delivered(envelope, payload))
         return out
@@ -143,40 +149,12 @@ class NodeSlot:
         """Look up once where a kind of payload goes."""
         kind = type(payload)
         if kind not in self.node.outputs:
-            raise TypeError(f"{self.key} said {kind.__name__}, which is not among its outputs")
-        topic = topic_of(kind)
-        stream = self.sequences.stream(topic, owner_of(topic, payload, self.process))
+            raise TypeError(f"{self.key} published {kind.__name__}, which is not among its outputs")
+        stream = self.sequences.stream(kind.TOPIC, owner_of(kind.TOPIC, payload, self.process))
         self._streams[kind, payload.vehicle] = stream
         return stream
 
     def _causes(self, trigger: Cause | None) -> tuple[Cause, ...]:
-        newest = tuple(
-            Cause(index, sequence)
-            for index, sequence in self._newest.items()
-            if trigger is None or index != trigger.topic_index
-        )
-        return newest if trigger is None else (trigger, *newest)
-
-
-class Dispatch:
-    """Who hears what in one process: topic row and vehicle of the payload to slots."""
-
-    def __init__(self, slots: Iterable[NodeSlot]) -> None:
-        self._table: dict[tuple[int, str], list[NodeSlot]] = {}
-        for slot in slots:
-            for payload in slot.node.inputs:
-                topic = topic_of(payload)
-                vehicles = ("",) if topic.scope is Scope.RIG else slot.node.vehicles_heard(payload)
-                for vehicle in vehicles:
-                    self._table.setdefault((topic.index, vehicle), []).append(slot)
-
-    def hearers(self, topic: Topic, payload: Message) -> list[NodeSlot]:
-        """Slots that hear this payload, in the order of the node table."""
-        return self._table.get((topic.index, payload.vehicle), _NOBODY)
-
-    def topics(self) -> Mapping[tuple[int, str], list[NodeSlot]]:
-        """Everything heard here, by (topic row, vehicle)."""
-        return self._table
-
-
-_NOBODY: list[NodeSlot] = []
+        if trigger is None:
+            return tuple(self._newest.values())
+        return (trigger, *(cause for cause in self._newest.values() if cause is not trigger))

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import CalibrationFileError
-from groundstation.files.json_file import read_camera_file
+from groundstation.files.errors import FileError
+from groundstation.files.json_file import parse_json
+from groundstation.files.reading import read_bytes
 from groundstation.frames import turned_axes
 
 _SCALARS = (
@@ -90,14 +91,22 @@ class CameraCalibration:
         """Read ``camera.json``.
 
         Raises:
-            CalibrationFileError: The file is missing, no JSON, or a key is missing or impossible.
+            FileError: The file is missing, no JSON, or a key is missing or impossible.
         """
-        path = Path(path)
-        data = read_camera_file(path)
+        return cls.parse(read_bytes(Path(path)), Path(path))
+
+    @classmethod
+    def parse(cls, data: bytes, path: Path) -> "CameraCalibration":
+        """Read the content of ``camera.json``.
+
+        Raises:
+            FileError: It is no JSON, or a key is missing or impossible.
+        """
+        found = parse_json(data, path)
         try:
-            return cls.from_mapping(data)
+            return cls.from_mapping(found)
         except ValueError as error:
-            raise CalibrationFileError(f"{path}: {error}.") from error
+            raise FileError(f"{path}: {error}.") from error
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> "CameraCalibration":

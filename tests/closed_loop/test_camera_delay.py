@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import parse_rig
+from groundstation.declarations.errors import UsageError
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.stars.sections import StarsOfType
+from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
@@ -32,7 +33,7 @@ def fly_and_measure(folder, heading_deg, delay_s, seed):
     text = rig_of(heading_deg, delay_s)
     rig_path, recording, out = folder / "rig.toml", folder / "turn.mcap", folder / "delay.toml"
     rig_path.write_text(text)
-    run_lockstep(parse_rig(text, rig_path), rig_path, recording, 14.0, seed, lambda *_: None)
+    run_lockstep(parse_rig(text, rig_path), text, rig_path, recording, 14.0, seed, lambda *_: None)
     call = ["delay", str(recording), "--out", str(out)]
     CliRunner().invoke(app, [*call, "--plot", str(folder / "delay.png")], catch_exceptions=False)
     return call, out
@@ -48,7 +49,8 @@ def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path):
     assert found.sigma_s < 3e-3
     text, rig_path = rig_of(45.0, 0.055), tmp_path / "rig.toml"
     measured = text.replace("delay_s = 0.015\ndelay_sigma_s = 0.001", 'delay_file = "delay.toml"', 1)
-    assert parse_rig(measured, rig_path).mock_ups["standard"].star_camera.delay_s == found.delay_s
+    camera = parse_rig(measured, rig_path).of_type("alpha", StarsOfType).star_camera
+    assert camera.delay == (found.delay_s, found.sigma_s)
     with pytest.raises(UsageError, match="star cameras fly on alpha"):
         CliRunner().invoke(app, [*call, "--vehicle", "beta"], catch_exceptions=False)
 

@@ -5,7 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.messages import definitions as m
+from groundstation.parts.fusion.messages import FixAccount, FusionStatus, VehicleState
+from groundstation.parts.imu.messages import Imu
+from groundstation.parts.operation.messages import Diagnostics, SequencePhase
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
 
 FAULT_S, END_S, STOP_S = 4.0, 6.0, 8.0
 
@@ -21,16 +25,16 @@ def fault(kind, **parameters):
 
 def assert_survived(flight):
     """It flies on, on the table, near its goal, with a state that agrees with truth."""
-    assert flight.of(m.SequencePhase)[-1].phase == "flying"
-    truth = flight.of(m.ReferenceState, start_s=STOP_S - 0.5)
-    states = flight.of(m.VehicleState, start_s=STOP_S - 0.5)
+    assert flight.of(SequencePhase)[-1].phase == "flying"
+    truth = flight.of(ReferenceState, start_s=STOP_S - 0.5)
+    states = flight.of(VehicleState, start_s=STOP_S - 0.5)
     assert states
     assert states[-1].status == "flying"
     error = np.subtract(states[-1].position_table_m, truth[-1].position_table_m)
     assert np.hypot(*error) < 0.02
     distances, _ = flight.off_goal(start_s=STOP_S - 0.5)
     assert distances.max() < 0.4
-    assert flight.of(m.ValveCommand, start_s=STOP_S - 0.1)[-1].gate == "open"
+    assert flight.of(ValveCommand, start_s=STOP_S - 0.1)[-1].gate == "open"
 
 
 @pytest.mark.parametrize(
@@ -49,7 +53,7 @@ def test_noise_on_the_line_is_counted_by_its_name(fly, kind, parameters, counter
 
 def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
     flight = fly(fault("stuck_gyro", code=0)).run(STOP_S)
-    samples = flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S)
+    samples = flight.of(Imu, start_s=FAULT_S + 0.1, stop_s=END_S)
     assert all("gyro_range" in imu.reason for imu in samples)
     assert not any(imu.valid for imu in samples)
     assert_survived(flight)
@@ -57,9 +61,9 @@ def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
 
 def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
     flight = fly(fault("stuck_gyro")).run(STOP_S + 6.0)
-    late = flight.of(m.Imu, start_s=FAULT_S + 0.6, stop_s=END_S - 0.1)
+    late = flight.of(Imu, start_s=FAULT_S + 0.6, stop_s=END_S - 0.1)
     assert {imu.reason for imu in late} == {"gyro_stuck"}
-    assert flight.of(m.VehicleState)[-1].status == "flying"
+    assert flight.of(VehicleState)[-1].status == "flying"
     distances, _ = flight.off_goal(start_s=STOP_S + 5.5)
     assert distances.max() < 0.4
 
@@ -67,22 +71,20 @@ def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
 @pytest.mark.parametrize(("axis", "name", "usable"), [(0, "x", 0b101), (1, "y", 0b011)])
 def test_a_tilt_chip_that_dies_is_named_and_the_vehicle_flies_on_without_it(fly, axis, name, usable):
     flight = fly(fault("dead_tilt", axis=axis)).run(STOP_S)
-    dead = flight.of(m.Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
+    dead = flight.of(Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
     assert all(f"tilt_{name}" in imu.reason and not imu.valid and imu.usable == usable for imu in dead)
-    said = {row.summary for row in flight.said[m.Diagnostics] if row.node == "alpha/fusion"}
+    said = {row.summary for row in flight.published[Diagnostics] if row.node == "alpha/fusion"}
     assert (
         f"alpha/fusion: accelerometer {name} not believed: flying by gyro, fixes and valve commands" in said
     )
     # one state per sample, and it is right: the valves are known to have pushed
-    states = flight.of(m.VehicleState, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
+    states = flight.of(VehicleState, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
     assert len(states) == len(dead)
     assert all(state.status == "flying" for state in states)
-    truth = flight.of(m.ReferenceState, stop_s=END_S)[-1]
+    truth = flight.of(ReferenceState, stop_s=END_S)[-1]
     at = min(states, key=lambda state: abs(state.stamp_ns - truth.stamp_ns))
     assert math.dist(at.position_table_m, truth.position_table_m) < 0.015
-    assert all(
-        row.source == "controller" for row in flight.of(m.ValveSelection, start_s=FAULT_S, stop_s=END_S)
-    )
+    assert all(row.source == "controller" for row in flight.of(ValveSelection, start_s=FAULT_S, stop_s=END_S))
     assert_survived(flight)
 
 
@@ -94,13 +96,13 @@ def test_without_both_tilt_chips_a_station_is_kept_for_half_a_minute(fly):
     flight = fly(both).run(36.0)
     distances, _ = flight.off_goal(start_s=24.0)
     assert distances.max() < 0.06
-    truth = flight.of(m.ReferenceState)[-1]
-    assert math.dist(flight.of(m.VehicleState)[-1].position_table_m, truth.position_table_m) < 0.03
+    truth = flight.of(ReferenceState)[-1]
+    assert math.dist(flight.of(VehicleState)[-1].position_table_m, truth.position_table_m) < 0.03
 
 
 def test_without_stars_the_age_of_the_fix_grows_and_the_vehicle_holds_on(fly):
     flight = fly(fault("dead_sky")).run(STOP_S)
-    before_end = flight.of(m.FusionStatus, start_s=END_S - 0.3, stop_s=END_S)
+    before_end = flight.of(FusionStatus, start_s=END_S - 0.3, stop_s=END_S)
     assert before_end[-1].fix_age_s > END_S - FAULT_S - 0.3
     assert_survived(flight)
 
@@ -112,10 +114,10 @@ def test_a_frozen_camera_cannot_pull_the_vehicle_along(fly):
 
 def test_wrong_fixes_are_refused_and_counted(fly):
     flight = fly(fault("false_lights")).run(STOP_S)
-    refused = [row for row in flight.of(m.FixAccount, start_s=FAULT_S) if not row.used]
+    refused = [row for row in flight.of(FixAccount, start_s=FAULT_S) if not row.used]
     assert refused
     assert all(row.reason for row in refused)
-    assert flight.of(m.FusionStatus)[-1].fixes_refused >= len(refused)
+    assert flight.of(FusionStatus)[-1].fixes_refused >= len(refused)
     assert_survived(flight)
 
 
@@ -127,9 +129,9 @@ def test_the_other_valves_make_up_for_one_that_fails(fly, kind):
 
 def test_a_silent_bus_closes_the_valves_and_flight_goes_on_when_it_speaks_again(fly):
     flight = fly(fault("silent_bus")).run(STOP_S)
-    assert not flight.of(m.ValveStatus, start_s=FAULT_S + 0.1, stop_s=END_S)
-    first = flight.of(m.ValveStatus, start_s=END_S)[0]
+    assert not flight.of(ValveStatus, start_s=FAULT_S + 0.1, stop_s=END_S)
+    first = flight.of(ValveStatus, start_s=END_S)[0]
     assert first.dead_man
     assert first.open_mask == 0
-    assert flight.of(m.ValveStatus)[-1].armed
+    assert flight.of(ValveStatus)[-1].armed
     assert_survived(flight)

@@ -4,13 +4,15 @@ import pytest
 
 from calibration.imu.guided import GuidedSequence
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
 from groundstation.cli import calibrate_guided
 from groundstation.cli.calibrate_flight import constants, widened
+from groundstation.declarations.request import Ack, Request
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.messages import definitions as m
-from groundstation.nodes.fusion import Fusion
-from groundstation.runtime.estimation import fix_floors_of, rig_noise
+from groundstation.parts.fusion.estimation import fix_floors_of, rig_noise
+from groundstation.parts.fusion.fusion import Fusion
+from groundstation.parts.imu.messages import Imu
+from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.valves.messages import ValveStatus
 
 LONGEST_S = 400
 SCALE_ERROR = 0.012
@@ -29,10 +31,10 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly, mon
 
     def ask(_endpoint, vehicle, action, argument, author, _timeout_s):
         number, now_ns = next(numbers), flight.runner.now_ns
-        request = m.Request(now_ns, vehicle, number, author, action, argument)
-        envelope = Envelope(topic_of(m.Request), author, number, now_ns)
+        request = Request(now_ns, vehicle, number, author, action, argument)
+        envelope = Envelope(Request.TOPIC, author, number, now_ns)
         flight.runner._publish([Delivered(envelope, request)])
-        return m.Ack(now_ns, vehicle, number, author, action, True, "")
+        return Ack(now_ns, vehicle, number, author, action, True, "")
 
     clock_ns = [0]
     monkeypatch.setattr(calibrate_guided, "ask", ask)
@@ -45,16 +47,16 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly, mon
     for second in range(LONGEST_S):
         flight.run(1.0)
         said = sorted(
-            (payload for kind in (m.Imu, m.StarFix, m.ValveStatus) for payload in flight.said[kind]),
+            (payload for kind in (Imu, StarFix, ValveStatus) for payload in flight.published[kind]),
             key=lambda payload: payload.stamp_ns,
         )
         for payload in said:
-            topic = topic_of(type(payload))
+            topic = payload.TOPIC
             clock_ns[0] = payload.stamp_ns
             watch.hear(f"alpha/{topic.noun}", topic.codec.encode(payload), b"")
             watch.work(0.0)
-        for kind in (m.Imu, m.StarFix, m.ValveStatus):
-            flight.said[kind].clear()
+        for kind in (Imu, StarFix, ValveStatus):
+            flight.published[kind].clear()
         advice = sequence.update(float(second), watch.known())
         if advice.step is None:
             break

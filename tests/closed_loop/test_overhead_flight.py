@@ -5,7 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from groundstation.messages.definitions import FixAccount, FixComparison, OverheadFix
+from groundstation.parts.fusion.messages import FixAccount
+from groundstation.parts.overhead.messages import FixComparison, OverheadFix
 
 FLY_S = 24.0
 FAULT = '\n[[laboratory.faults]]\nkind = "{kind}"\nvehicle = "alpha"\nstart_s = 12.0\n'

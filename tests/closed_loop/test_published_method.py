@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.messages import definitions as m
-from groundstation.runtime.lockstep_run import make_runner
-from groundstation.runtime.rig import parse_rig
+from groundstation.parts.fusion.messages import FusionStatus
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.rig.read import parse_rig
+from groundstation.runners.make_runner import make_runner
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "drawn_fixes.toml"
 
@@ -20,9 +21,9 @@ def test_the_published_method_holds_the_station():
 
     def observe(delivered, now_ns):
         payload = delivered.payload
-        if isinstance(payload, m.ReferenceState) and now_ns > 40e9:
+        if isinstance(payload, ReferenceState) and now_ns > 40e9:
             off_goal_m.append(math.dist(payload.position_table_m, (0.2, 0.1)))
-        elif isinstance(payload, m.FusionStatus):
+        elif isinstance(payload, FusionStatus):
             methods.add(payload.method)
 
     runner = make_runner(parse_rig(text, RIG), 1, [observe], journaled=False)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import app
-from groundstation.messages import definitions as m
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import parse_rig
+from groundstation.declarations.errors import UsageError
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.stars.messages import SkyChange, StarFix
+from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "late_pipeline.toml"
@@ -51,7 +51,7 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
         + fault("new_star", 3.0, 7.0, x_m=NEW_M[0], y_m=NEW_M[1]),
         rig="late_pipeline",
     ).run(10.0)
-    changes = flight.of(m.SkyChange)
+    changes = flight.of(SkyChange)
     assert all(change.stamp_ns > 3_000_000_000 for change in changes)
     first = {}
     for change in changes:
@@ -70,8 +70,8 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
     assert math.hypot(new.x_m - NEW_M[0], new.y_m - NEW_M[1]) < 3e-4
     assert new.sightings == 25
     assert 0.0 < new.place_cov[0] < 1e-7
-    assert all(fix.fix for fix in flight.of(m.StarFix))
-    mode_of = {fix.mode for fix in flight.of(m.StarFix, start_s=5.0)}
+    assert all(fix.fix for fix in flight.of(StarFix))
+    mode_of = {fix.mode for fix in flight.of(StarFix, start_s=5.0)}
     assert mode_of == {"tracking", "lost-in-space"}
 
 
@@ -84,7 +84,7 @@ def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
     text += fault("moved_star", 0.0, star=moved[0], dx_m=SHIFT_M[0], dy_m=SHIFT_M[1])
     rig_path, recording, out = tmp_path / "rig.toml", tmp_path / "run.mcap", tmp_path / "amended.csv"
     rig_path.write_text(text)
-    run_lockstep(parse_rig(text, rig_path), rig_path, recording, 4.5, 3, lambda *_: None)
+    run_lockstep(parse_rig(text, rig_path), text, rig_path, recording, 4.5, 3, lambda *_: None)
     call = ["amend", str(CEILING), str(recording), "--out", str(out)]
     result = CliRunner().invoke(app, call, catch_exceptions=False)
     assert f"star {dead[1]}: struck off" in result.stdout

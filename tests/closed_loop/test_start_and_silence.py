@@ -1,19 +1,22 @@
-"""From landed to flying, and what closes the valves when somebody falls silent."""
+"""From landed to flying, and what closes the valves when a node publishes nothing any more."""
 
 import pytest
 
-from groundstation.messages import definitions as m
-from groundstation.nodes.node import Node
-from groundstation.runtime.errors import RigError
-from groundstation.runtime.lockstep_run import make_runner
-from groundstation.runtime.slot import NodeSlot
+from groundstation.declarations.errors import RigError
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, Request
+from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
+from groundstation.runners.make_runner import make_runner
+from groundstation.runners.slot import Slot
 
 SILENT_S = 5.0
 
 
 def mute(flight, name):
-    """From SILENT_S on nothing that a node says gets out, as if it had died."""
-    slots = {slot.key: slot for slot in flight.runner._slots}
+    """From SILENT_S on nothing that a node publishes gets out, as if it had died."""
+    slots = {slot.key: slot for slot in flight.runner._step.slots}
     slot = slots[f"alpha/{name}"]
     node = slot.node
 
@@ -23,29 +26,29 @@ def mute(flight, name):
         def start(self, now_ns):
             return node.start(now_ns)
 
-        def vehicles_heard(self, payload):
-            return node.vehicles_heard(payload)
+        def sources(self, payload):
+            return node.sources(payload)
 
         def receive(self, message, now_ns):
-            said = tuple(node.receive(message, now_ns))
-            return said if now_ns < SILENT_S * 1e9 else ()
+            made = tuple(node.receive(message, now_ns))
+            return made if now_ns < SILENT_S * 1e9 else ()
 
         def tick(self, now_ns):
-            said = tuple(node.tick(now_ns))
-            return said if now_ns < SILENT_S * 1e9 else ()
+            made = tuple(node.tick(now_ns))
+            return made if now_ns < SILENT_S * 1e9 else ()
 
-    assert isinstance(slot, NodeSlot)
+    assert isinstance(slot, Slot)
     slot.node = Mute(node.vehicle, node.tick_period_ns)
 
 
 def test_the_start_goes_landed_rest_float_armed_flying(fly):
     flight = fly().run(4.0)
-    phases = [row.phase for row in flight.of(m.SequencePhase) if not row.phase.startswith("waiting")]
+    phases = [row.phase for row in flight.of(SequencePhase) if not row.phase.startswith("waiting")]
     assert phases == ["rest calibration", "float air", "arming", "flying"]
-    asked = [row.action for row in flight.of(m.Request)]
+    asked = [row.action for row in flight.of(Request)]
     assert asked == ["float_on", "arm"]
-    assert [(row.action, row.accepted) for row in flight.of(m.Ack)] == [("float_on", True), ("arm", True)]
-    before = flight.of(m.ValveStatus, stop_s=1.0)
+    assert [(row.action, row.accepted) for row in flight.of(Ack)] == [("float_on", True), ("arm", True)]
+    before = flight.of(ValveStatus, stop_s=1.0)
     assert not any(status.floating or status.armed or status.open_mask for status in before)
 
 
@@ -53,19 +56,19 @@ def test_no_valve_opens_before_the_vehicle_is_armed(fly):
     flight = fly().run(4.0)
     armed_s = next(
         now_ns * 1e-9
-        for mode, now_ns in zip(flight.said[m.VehicleMode], flight.stamps_ns[m.VehicleMode], strict=True)
+        for mode, now_ns in zip(flight.published[VehicleMode], flight.stamps_ns[VehicleMode], strict=True)
         if mode.armed
     )
-    assert not any(status.open_mask for status in flight.of(m.ValveStatus, stop_s=armed_s))
+    assert not any(status.open_mask for status in flight.of(ValveStatus, stop_s=armed_s))
 
 
 def test_a_silent_controller_makes_the_mux_brake(fly):
     flight = fly()
     mute(flight, "controller")
     flight.run(SILENT_S + 4.0)
-    sources = {row.source for row in flight.of(m.ValveSelection, start_s=SILENT_S + 0.5)}
+    sources = {row.source for row in flight.of(ValveSelection, start_s=SILENT_S + 0.5)}
     assert sources == {"brake"}
-    speeds = [row.velocity_table_m_s for row in flight.of(m.ReferenceState, start_s=SILENT_S + 3.5)]
+    speeds = [row.velocity_table_m_s for row in flight.of(ReferenceState, start_s=SILENT_S + 3.5)]
     assert max(max(map(abs, speed)) for speed in speeds) < 0.005
 
 
@@ -73,18 +76,18 @@ def test_a_silent_mux_makes_the_guard_close(fly):
     flight = fly()
     mute(flight, "command_mux")
     flight.run(SILENT_S + 1.0)
-    late = flight.of(m.ValveCommand, start_s=SILENT_S + 0.15)
+    late = flight.of(ValveCommand, start_s=SILENT_S + 0.15)
     assert late
     assert not any(command.open_mask for command in late)
     assert {command.gate for command in late} == {"stale"}
-    assert not any(status.open_mask for status in flight.of(m.ValveStatus, start_s=SILENT_S + 0.2))
+    assert not any(status.open_mask for status in flight.of(ValveStatus, start_s=SILENT_S + 0.2))
 
 
 def test_a_silent_guard_makes_the_valve_node_close(fly):
     flight = fly()
     mute(flight, "guard")
     flight.run(SILENT_S + 1.0)
-    late = flight.of(m.ValveStatus, start_s=SILENT_S + 0.2)
+    late = flight.of(ValveStatus, start_s=SILENT_S + 0.2)
     assert all(status.dead_man and not status.open_mask for status in late)
 
 

@@ -1,8 +1,8 @@
 """A table that is out of level and wavy, with its map and without: what the map is worth in flight."""
 
-import importlib.util
+import importlib
+import json
 import math
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,14 +12,12 @@ from typer.testing import CliRunner
 
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
 from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.messages import definitions as m
-from groundstation.recording.writer import Recorder
-from groundstation.runtime.provenance import recording_info
-from groundstation.runtime.rig import load_rig
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.fusion.messages import FusionCalibration, FusionStatus, VehicleState
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.valves.messages import ValveDemand
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SURFACE = "tilt_rad = [0.0003, -0.0001]"
@@ -62,17 +60,16 @@ def tour(fly, legs, seed, table_map=None):
     )
     flight = fly(dark, seed=seed, changes=[WAVY, GOES, *table]).run(begin_s)
     for leg in range(legs):
-        request = m.Request(flight.runner.now_ns, "alpha", leg + 1, "tour", "go_to", POSES[leg])
-        envelope = Envelope(topic_of(m.Request), "tour", leg + 1, flight.runner.now_ns)
-        flight.runner._publish([Delivered(envelope, request)])
+        goal = dict(zip(("x_m", "y_m", "heading_rad"), POSES[leg], strict=True))
+        flight.request("go_to", json.dumps(goal), request_id=leg + 1, author="tour")
         flight.run(LEG_S)
     errors = []
     for end in ends:
-        state, truth = flight.of(m.VehicleState, stop_s=end)[-1], flight.of(m.ReferenceState, stop_s=end)[-1]
+        state, truth = flight.of(VehicleState, stop_s=end)[-1], flight.of(ReferenceState, stop_s=end)[-1]
         age_s = (truth.stamp_ns - state.stamp_ns) * 1e-9
         reached = np.add(state.position_table_m, np.multiply(age_s, state.velocity_table_m_s))
         errors.append(math.dist(reached, truth.position_table_m))
-    on_ms = sum(sum(demand.on_time_ms) for demand in flight.of(m.ValveDemand, start_s=begin_s))
+    on_ms = sum(sum(demand.on_time_ms) for demand in flight.of(ValveDemand, start_s=begin_s))
     return np.array(errors), 1e-3 * on_ms, flight
 
 
@@ -84,7 +81,7 @@ def test_with_the_true_map_an_outage_ends_nearer_to_the_truth(fly, tmp_path):
     with_map, _, flight = tour(fly, 1, seed, path)
     assert with_map[0] < 0.4 * without[0]
     # what the filter still finds beyond a true map is little
-    left = flight.of(m.FusionStatus)[-1].slope_left_m_s2
+    left = flight.of(FusionStatus)[-1].slope_left_m_s2
     assert math.hypot(*left) < 5e-4
 
 
@@ -97,11 +94,11 @@ def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(
         "hold = { x_m = 0.0, y_m = 0.0, heading_deg = 5.0 }",
     )
     flight = fly(seed=seed, changes=[WAVY, here, table]).run(3.0)
-    (said,) = flight.of(m.FusionCalibration)
-    assert said.names == ("table.map",)
-    assert said.contents == (path.read_text(),)
+    (calibration,) = flight.of(FusionCalibration)
+    assert calibration.names == ("table.map",)
+    assert calibration.contents == (path.read_text(),)
     pull = TableMap.load(path).acceleration_m_s2(0.0, 0.0)
-    first = flight.of(m.Wrench)[0]
+    first = flight.of(Wrench)[0]
     turn = math.radians(5.0)
     force = (
         math.cos(turn) * first.force_x_n - math.sin(turn) * first.force_y_n,
@@ -115,18 +112,10 @@ def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end
     fly, tmp_path, monkeypatch
 ):
     seed = 3
-    spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
-    survey_laps = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "survey_laps", survey_laps)
-    spec.loader.exec_module(survey_laps)
-    rig_path, laps, made = (
-        EXAMPLES / "rigs" / "survey_laps.toml",
-        tmp_path / "laps.mcap",
-        tmp_path / "map.toml",
-    )
-    rig = load_rig(rig_path)
-    with Recorder(laps, recording_info(rig, rig_path, seed, None)) as recorder:
-        survey_laps.fly(rig, 240.0, [recorder.record], seed)
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    survey_laps, waypoints = (importlib.import_module(name) for name in ("survey_laps", "waypoints"))
+    laps, made = tmp_path / "laps.mcap", tmp_path / "map.toml"
+    waypoints.record(survey_laps.RIG, laps, 240.0, survey_laps.surveys(["alpha"]), seed)
     result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
     assert result.exit_code == 0, result.output
     without, gas_without, _ = tour(fly, 3, seed)

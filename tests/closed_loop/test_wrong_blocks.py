@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from groundstation.messages import definitions as m
-from groundstation.runtime.lockstep_run import make_runner
-from groundstation.runtime.rig import parse_rig
+from groundstation.parts.imu.messages import Imu
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.rig.read import parse_rig
+from groundstation.runners.make_runner import make_runner
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 
@@ -13,9 +14,9 @@ def samples_of(text, seconds):
     samples, warnings = [], set()
 
     def observe(delivered, now_ns):
-        if isinstance(delivered.payload, m.Imu):
+        if isinstance(delivered.payload, Imu):
             samples.append(delivered.payload)
-        elif isinstance(delivered.payload, m.Diagnostics) and delivered.payload.level:
+        elif isinstance(delivered.payload, Diagnostics) and delivered.payload.level:
             warnings.add(delivered.payload.summary)
 
     runner = make_runner(parse_rig(text, RIGS / "test.toml"), 1, [observe])

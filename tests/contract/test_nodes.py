@@ -3,16 +3,17 @@
 from pathlib import Path
 
 import pytest
-
-from groundstation.bus.journal import JournalWriter
-from groundstation.bus.topics import TOPICS, Recorded, Scope, topic_of
-from groundstation.messages.definitions import Diagnostics, Journal, Latency
-from groundstation.nodes.actions import ACTIONS
+from groundstation.bus.topics import TOPICS, topic_of
 from groundstation.runtime.node_table import NODES, Weight, build_slots, key_of, make_node, process_of
-from groundstation.runtime.plan import gives_way, processes_of
 from groundstation.runtime.ports import ports_of
-from groundstation.runtime.rig import load_rig
-from groundstation.runtime.slot import Sequences
+
+from groundstation.bus.journal import Journal, JournalWriter
+from groundstation.declarations.request import ACTIONS
+from groundstation.declarations.topic import Recorded, Scope
+from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.rig.plan import gives_way, processes_of
+from groundstation.rig.read import load_rig
+from groundstation.runners.slot import Sequences
 
 RIG_FILES = sorted((Path(__file__).parents[2] / "examples" / "rigs").glob("*.toml"))
 RIGS = {path.stem: load_rig(path) for path in RIG_FILES}
@@ -33,7 +34,7 @@ def nodes_of(rig):
 
 
 def said_by(found):
-    return {(topic_of(kind), node.vehicle) for node in found.values() for kind in node.outputs}
+    return {(kind.TOPIC, node.vehicle) for node in found.values() for kind in node.outputs}
 
 
 def test_a_row_of_the_node_table_has_a_name_of_its_own():
@@ -47,7 +48,7 @@ def test_what_a_node_hears_and_says_has_a_topic(name, nodes):
     for key, node in nodes[name].items():
         assert node.inputs, key
         for kind in (*node.inputs, *node.outputs):
-            assert topic_of(kind).payload is kind, key
+            assert kind.TOPIC.payload is kind, key
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -55,8 +56,8 @@ def test_a_topic_of_a_vehicle_has_one_publisher(name, nodes):
     publishers = {}
     for key, node in nodes[name].items():
         for kind in node.outputs:
-            if topic_of(kind).scope is Scope.VEHICLE:
-                publishers.setdefault((topic_of(kind).noun, node.vehicle), []).append(key)
+            if kind.TOPIC.scope is Scope.VEHICLE:
+                publishers.setdefault((kind.TOPIC.noun, node.vehicle), []).append(key)
     for port in ports_of(RIGS[name]):
         publishers.setdefault((topic_of(port.reads).noun, port.vehicle), []).append(port.channel)
     assert {where: who for where, who in publishers.items() if len(who) > 1} == {}
@@ -66,9 +67,9 @@ def test_a_topic_of_a_vehicle_has_one_publisher(name, nodes):
 def test_truth_is_heard_by_observers_only(name, nodes):
     for key, node in nodes[name].items():
         for kind in node.inputs:
-            if topic_of(kind).observers_only:
+            if kind.TOPIC.observers_only:
                 assert key.rpartition("/")[2] in OBSERVERS
-                assert all(topic_of(said).observers_only for said in node.outputs)
+                assert all(said.TOPIC.observers_only for said in node.outputs)
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -77,19 +78,19 @@ def test_what_a_node_hears_is_said_by_somebody(name, nodes):
     nouns = {topic.noun for topic, _ in said} | {"request"}  # operators ask, too
     for key, node in nodes[name].items():
         for kind in node.inputs:
-            is_heard = topic_of(kind).scope is Scope.RIG or node.vehicles_heard(kind)
-            assert topic_of(kind).noun in nouns or not is_heard, f"{key} waits for {kind.__name__} for ever"
+            is_heard = kind.TOPIC.scope is Scope.RIG or node.vehicles_heard(kind)
+            assert kind.TOPIC.noun in nouns or not is_heard, f"{key} waits for {kind.__name__} for ever"
 
 
 def test_every_topic_is_said_in_some_example(nodes):
     said = {topic for found in nodes.values() for topic, _ in said_by(found)}
     said |= {topic_of(port.reads) for rig in RIGS.values() for port in ports_of(rig)}
-    said |= {topic_of(kind) for kind in (Journal, Diagnostics, Latency)}  # of the runner
+    said |= {kind.TOPIC for kind in (Journal, Diagnostics, Latency)}  # of the runner
     assert {topic.noun for topic in TOPICS} == {topic.noun for topic in said}
 
 
 def test_every_topic_is_kept_or_heard(nodes):
-    heard = {topic_of(kind) for found in nodes.values() for node in found.values() for kind in node.inputs}
+    heard = {kind.TOPIC for found in nodes.values() for node in found.values() for kind in node.inputs}
     for topic in TOPICS:
         assert topic.recorded is Recorded.ALWAYS or topic in heard
 

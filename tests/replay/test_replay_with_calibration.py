@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
-from groundstation.bus.topics import topic_of
-from groundstation.cli.table_map_flights import read_source
+from calibration.table.smoothed_flights import read_source
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.messages.definitions import FusionCalibration
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.fusion.messages import FusionCalibration
 from groundstation.recording.reader import Recording
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import make_node
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.rig import load_rig, parse_rig
+from groundstation.rig.plan import make_node
+from groundstation.rig.read import load_rig, parse_rig
+from groundstation.runners.replay import ReplayRunner
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
@@ -32,7 +31,7 @@ def write_map(path, pull_m_s2):
 def replayed(path):
     with Recording(path) as recording:
         rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path))
-        found = [row.payload for row in recording.messages((topic_of(FusionCalibration),), ("alpha",))]
+        found = [row.payload for row in recording.messages((FusionCalibration.TOPIC,), ("alpha",))]
         return found, recording.info, ReplayRunner(recording, lambda key: make_node(rig, key)).run()
 
 

@@ -7,7 +7,7 @@ import subprocess
 import time
 
 from bench.rows import RIGS, ROOT, Bench, Row
-from groundstation.runtime.rig import load_rig
+from groundstation.rig.read import load_rig
 
 LIMIT_S = 180.0
 GIVE_UP_S = 600.0

@@ -9,11 +9,13 @@ import numpy as np
 
 from bench.journal_of import consumed, made_from
 from bench.rows import RIGS, ROOT, Bench, Row
-from groundstation.bus.topics import topic_of
-from groundstation.messages import definitions as m
-from groundstation.messages.base import Message
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.imu.messages import Imu, ImuBytes
+from groundstation.parts.stars.messages import StarFix
 from groundstation.recording.reader import Recorded, Recording
-from groundstation.runtime.rig import Rig, load_rig
+from groundstation.rig.read import load_rig
 
 RIG = RIGS / "two_mock_ups.toml"
 STATE_MS = (2.0, 10.0)
@@ -77,18 +79,18 @@ def _fly(bench: Bench, path: Path, duration_s: float) -> None:
 
 
 def _messages(recording: Recording, kind: type[Message], vehicle: str) -> Iterator[Recorded]:
-    return recording.messages([topic_of(kind)], [vehicle])
+    return recording.messages([kind], [vehicle])
 
 
 def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:
     """Frames that the ticks miss or that fusion never took, and frames seen."""
-    taken = consumed(recording, f"{vehicle}/fusion", m.Imu)
+    taken = consumed(recording, f"{vehicle}/fusion", Imu)
     missing_ticks = 0
     said: list[int] = []
-    before: m.Imu | None = None
-    for message in _messages(recording, m.Imu, vehicle):
+    before: Imu | None = None
+    for message in _messages(recording, Imu, vehicle):
         sample = message.payload
-        assert isinstance(sample, m.Imu)
+        assert isinstance(sample, Imu)
         if before is not None:
             window = round(sample.window_s * 1e3)
             missing_ticks += round((sample.tick_ms - before.tick_ms) / window) - 1
@@ -100,12 +102,12 @@ def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:
 
 
 def _bytes_to_state_ms(recording: Recording, vehicle: str) -> list[float]:
-    sample_of_state = made_from(recording, f"{vehicle}/fusion", m.Imu, m.VehicleState)
-    read_of_sample = made_from(recording, f"{vehicle}/imu_reader", m.ImuBytes, m.Imu)
-    arrived = {x.envelope.sequence: x.payload.stamp_ns for x in _messages(recording, m.ImuBytes, vehicle)}
+    sample_of_state = made_from(recording, f"{vehicle}/fusion", Imu, VehicleState)
+    read_of_sample = made_from(recording, f"{vehicle}/imu_reader", ImuBytes, Imu)
+    arrived = {x.envelope.sequence: x.payload.stamp_ns for x in _messages(recording, ImuBytes, vehicle)}
     begin_ns = recording.start_ns + round(WARM_UP_S * 1e9)
     ages_ms = []
-    for message in _messages(recording, m.VehicleState, vehicle):
+    for message in _messages(recording, VehicleState, vehicle):
         read = read_of_sample.get(sample_of_state.get(message.envelope.sequence, 0))
         if read in arrived and arrived[read] >= begin_ns:
             ages_ms.append((message.envelope.publish_ns - arrived[read]) * 1e-6)
@@ -119,9 +121,9 @@ def _frame_to_fix_ms(recording: Recording, vehicle: str, rig: Rig) -> list[float
     delay_ns = round(camera.delay_s * 1e9)
     begin_ns = recording.start_ns + round(WARM_UP_S * 1e9)
     ages_ms = []
-    for message in _messages(recording, m.StarFix, vehicle):
+    for message in _messages(recording, StarFix, vehicle):
         fix = message.payload
-        assert isinstance(fix, m.StarFix)
+        assert isinstance(fix, StarFix)
         arrived_ns = fix.stamp_ns + delay_ns
         if fix.fix and arrived_ns >= begin_ns:
             ages_ms.append((message.envelope.publish_ns - arrived_ns) * 1e-6)

@@ -9,21 +9,15 @@ from groundstation.control.controller import Controller as ControlLaw
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
 from groundstation.control.state import Wrench as BodyWrench
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    Ack,
-    ControlStatus,
-    FusionStatus,
-    Request,
-    ValveCommand,
-    ValveDemand,
-    VehicleState,
-    Wrench,
-)
-from groundstation.nodes.actions import answer, is_for, refusal
-from groundstation.nodes.node import Node
+from groundstation.parts.control.actions import GO_TO
+from groundstation.parts.control.messages import ControlStatus, Wrench
+from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 
 STALE_NS = 300_000_000
 STATUS_EVERY = 2
@@ -45,6 +39,7 @@ class Controller(Node):
 
     inputs = (VehicleState, FusionStatus, ValveDemand, ValveCommand, Request)
     outputs = (Wrench, ControlStatus, Ack)
+    trigger = VehicleState
 
     def __init__(
         self,
@@ -71,7 +66,7 @@ class Controller(Node):
         self._delivered = NO_WRENCH
         self._ticks = 0
 
-    def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
+    def sources(self, payload: type[Message]) -> tuple[str, ...]:
         if payload is VehicleState:
             return (self.vehicle, *self._neighbours)
         return (self.vehicle,)
@@ -97,7 +92,7 @@ class Controller(Node):
                 if is_open and not self._gate_open:
                     self._law.reset()
                 self._gate_open = is_open
-            case Request() if is_for(message, "controller"):
+            case Request() if message.action == GO_TO.name:
                 yield answer(message, now_ns, self._go_to(message))
 
     def tick(self, now_ns: int) -> Iterator[Message]:
@@ -131,19 +126,26 @@ class Controller(Node):
 
     def _go_to(self, request: Request) -> str:
         """Take the goal, or say why not."""
-        reason = refusal(request)
-        if reason:
-            return reason
-        x, y, heading = request.argument
+        try:
+            given = GO_TO.read(request)
+        except ArgumentError as error:
+            return str(error)
+        x, y, heading = (float(given[name]) for name in ("x_m", "y_m", "heading_rad"))
         if min(self._keep_in.edge_distances_m((x, y))) < 0.0:
             return f"({x:.3f}, {y:.3f}) m lies outside the part of the table that vehicles keep to"
         self._goal = Goal((x, y), heading)
         return ""
 
     def _status(self, state: ControlState, now_ns: int) -> ControlStatus:
-        goal = self._goal
-        distance = math.dist(state.position_table_m, goal.position_table_m)
-        turn = wrap_angle(goal.heading_rad - state.heading_rad)
+        setpoint = self._law.setpoint(self._goal)
+        distance_m = math.dist(state.position_table_m, setpoint.position_table_m)
+        turn_rad = wrap_angle(setpoint.heading_rad - state.heading_rad)
         return ControlStatus(
-            now_ns, self.vehicle, self._name, goal.position_table_m, goal.heading_rad, distance, turn
+            now_ns,
+            self.vehicle,
+            self._name,
+            setpoint.position_table_m,
+            setpoint.heading_rad,
+            distance_m,
+            turn_rad,
         )

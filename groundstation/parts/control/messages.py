@@ -6,6 +6,7 @@ from typing import ClassVar
 from groundstation.declarations.message import F64, PACKAGE, Float64x2, Message, Text
 from groundstation.declarations.topic import Rank, Topic
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Wrench(Message):
     """Force and torque asked for by the controller, body frame; z components of the other axes are 0."""
@@ -22,7 +23,7 @@ class Wrench(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlStatus(Message):
-    """The goal in force and the distance to it."""
+    """The setpoint that the controller works for at present, and the distance to it."""
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ControlStatus"
     TOPIC: ClassVar = Topic("control_status", 5, Rank.COMMAND)

@@ -1,6 +1,7 @@
 """Part ``control``: the state becomes the wrench that the vehicle's controller wants."""
 
 import math
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -16,7 +17,7 @@ from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of
 
 
-def _row(rig: Rig, vehicle: str) -> ControllerRow:
+def _row(rig: Rig, vehicle: str) -> ControllerRow[Any]:
     return controllers()[control_of(rig, vehicle)[0].controller]
 
 
@@ -85,7 +86,7 @@ PART = Part(
     name="control",
     summary="the state becomes the wrench that the controller wants",
     topics=(Wrench, ControlStatus),
-    nodes=(NodeRow("controller", _process, Weight.LIGHT, _controller),),
+    nodes=(NodeRow("controller", _process, Weight.LIGHT, Controller, _controller),),
     actions=(GO_TO,),
     mock_up=ControlOfType,
     vehicle=ControlOfVehicle,

@@ -2,8 +2,8 @@
 
 from groundstation.control.valve_push import ValvePush
 from groundstation.fusion.estimator import Estimator
-from groundstation.messages.definitions import Imu, ValveCommand
-from groundstation.messages.imu import USABLE_FORCE_X, USABLE_FORCE_Y
+from groundstation.parts.imu.messages import USABLE_FORCE_X, USABLE_FORCE_Y, Imu
+from groundstation.parts.valves.messages import ValveCommand
 
 _FORCES = USABLE_FORCE_X | USABLE_FORCE_Y
 

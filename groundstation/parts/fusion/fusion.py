@@ -6,28 +6,19 @@ from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.declarations.fix import Floor, PoseFix
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
-from groundstation.fusion.error_state_filter import WAITS
-from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
+from groundstation.fusion.estimator import WAITS, Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    Diagnostics,
-    FixAccount,
-    FusionCalibration,
-    FusionStatus,
-    Imu,
-    OverheadFix,
-    Request,
-    StarFix,
-    ValveCommand,
-    ValveStatus,
-    VehicleState,
-)
-from groundstation.messages.imu import USABLE_RATE
-from groundstation.nodes.force_stand_in import ForceStandIn
-from groundstation.nodes.node import Node
+from groundstation.parts.fusion.force_stand_in import ForceStandIn
+from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
+from groundstation.parts.imu.messages import USABLE_RATE, Imu
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 
 STATUS_PERIOD_NS = 200_000_000
 ORDER_HOLDS_NS = 1_000_000_000  # after an order to float, older status frames may still say "landed"
@@ -35,8 +26,6 @@ DIAGNOSTICS_EVERY = 5
 LONGEST_WAIT_NS = 1_000_000_000
 LONGEST_ALONE_NS = round(1.2 * CANDIDATE_AGE_S * 1e9)
 NO_PACKETS = "no packets come"
-SOURCES: Mapping[type[Message], str] = MappingProxyType({StarFix: "stars", OverheadFix: "overhead"})
-"""Messages that bring fixes, and the rig's word for who says them."""
 NO_FILES: Mapping[str, tuple[str, str]] = MappingProxyType({})
 
 
@@ -47,13 +36,13 @@ class Fusion(Node):
         vehicle: Its name.
         estimator: A fresh one.
         method: Its row in the table of estimators.
-        floors: What calibration leaves in every fix, beyond its own covariance, for each source whose fixes
-            are taken (``stars``, ``overhead``): x, y (m), heading (rad).
+        payloads: Class of the fixes of each source that is taken, by the source's name.
+        floors: What calibration leaves in every fix of each source, beyond its own covariance.
         calibration: The files that the estimator was made from, by name: hash and text.
         stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
-    inputs = (Imu, StarFix, OverheadFix, ValveStatus, ValveCommand, Request)
+    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Request)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
@@ -61,11 +50,14 @@ class Fusion(Node):
         vehicle: str,
         estimator: Estimator,
         method: str,
-        floors: Mapping[str, tuple[float, float]],
+        payloads: Mapping[str, type[PoseFix]],
+        floors: Mapping[str, Floor],
         calibration: Mapping[str, tuple[str, str]] = NO_FILES,
         stand_in: ForceStandIn | None = None,
     ) -> None:
         super().__init__(vehicle, STATUS_PERIOD_NS)
+        self.inputs = (Imu, *payloads.values(), ValveStatus, ValveCommand, Request)
+        self._sources = {payload: name for name, payload in payloads.items()}
         self._estimator = estimator
         self._method = method
         self._calibration = calibration
@@ -83,10 +75,6 @@ class Fusion(Node):
         self._used = self._refused = self._ticks = 0
         self._waiting: dict[tuple[int, str], tuple[int, Account]] = {}
 
-    def vehicles_heard(self, payload: type[Message]) -> tuple[str, ...]:
-        source = SOURCES.get(payload)
-        return () if source is not None and source not in self._floors else (self.vehicle,)
-
     def start(self, now_ns: int) -> Iterator[Message]:
         if self._calibration:
             hashes, texts = zip(*self._calibration.values(), strict=True)
@@ -96,8 +84,8 @@ class Fusion(Node):
         match message:
             case Imu():
                 yield from self._propagate(message)
-            case StarFix(fix=True) | OverheadFix(fix=True) if SOURCES[type(message)] in self._floors:
-                yield from self._correct(message, SOURCES[type(message)], now_ns)
+            case PoseFix(fix=True):
+                yield from self._correct(message, self._sources[type(message)], now_ns)
             case ValveStatus():
                 if message.floating or now_ns - self._float_ordered_ns >= ORDER_HOLDS_NS:
                     self._hear_float(now_ns, floating=message.floating)
@@ -156,7 +144,7 @@ class Fusion(Node):
             self._state = state
             yield self._say(state)
 
-    def _correct(self, fix: StarFix | OverheadFix, source: str, now_ns: int) -> Iterator[Message]:
+    def _correct(self, fix: PoseFix, source: str, now_ns: int) -> Iterator[Message]:
         covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
             motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.omega_rad_s])

@@ -3,8 +3,20 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, I64, PACKAGE, U32, Bool, Float64x2, Float64x3, Message, Text, TextSequence
+from groundstation.declarations.message import (
+    F64,
+    I64,
+    PACKAGE,
+    U32,
+    Bool,
+    Float64x2,
+    Float64x3,
+    Message,
+    Text,
+    TextSequence,
+)
 from groundstation.declarations.topic import Rank, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VehicleState(Message):

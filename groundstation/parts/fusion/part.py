@@ -1,14 +1,17 @@
 """Part ``fusion``: IMU samples and late fixes become the vehicle's state."""
 
+from collections.abc import Mapping
+
 from groundstation.control.valve_push import ValvePush
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimator import Estimator
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
-from groundstation.parts.fusion.fusion import Fusion
+from groundstation.parts.fusion.fusion import NO_FILES, Fusion
 from groundstation.parts.fusion.gauges import FIGURES, GAUGES
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle
@@ -21,10 +24,21 @@ def _fusion(rig: Rig, vehicle: str) -> Node:
     type_ = rig.type_of(vehicle)
     push = ValvePush(type_.model(), type_.valves.open_delay_s, type_.valves.close_delay_s)
     stand_in = ForceStandIn(estimator, push, type_.mass_kg, type_.inertia_kg_m2)
-    payloads = {name: rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle)}
-    return Fusion(
-        vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration_texts(rig, vehicle), stand_in
-    )
+    return fusion_node(rig, vehicle, estimator, method, calibration_texts(rig, vehicle), stand_in)
+
+
+def fusion_node(
+    rig: Rig,
+    vehicle: str,
+    estimator: Estimator,
+    method: str = "filter",
+    calibration: Mapping[str, tuple[str, str]] = NO_FILES,
+    stand_in: ForceStandIn | None = None,
+) -> Fusion:
+    """The fusion node of a vehicle around an estimator, with the fixes that the rig lets it take."""
+    sources = rig.tables.fix_sources
+    payloads = {name: sources[name].payload for name in fused_sources(rig, vehicle)}
+    return Fusion(vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration, stand_in)
 
 
 def _check(rig: Rig) -> None:
@@ -48,7 +62,8 @@ def _check_sources(rig: Rig, name: str) -> None:
     for source in named:
         if source not in known:
             raise ValueError(
-                f"vehicles.{name}.fix_sources: {source!r} is no source of fixes (there are {', '.join(known)})"
+                f"vehicles.{name}.fix_sources: {source!r} is no source of fixes "
+                f"(there are {', '.join(known)})"
             )
         if not known[source].condition(rig, name):
             raise ValueError(f"vehicles.{name}: fix_sources {source!r} needs {known[source].needs}")
@@ -59,7 +74,8 @@ def _check_sources(rig: Rig, name: str) -> None:
     method = rig.of_type(name, FusionOfType).fusion.method
     if len(fused) > 1 and method != "filter":
         raise ValueError(
-            f"vehicles.{name}.fix_sources: the estimator {method!r} takes one source: choose 'filter', or name one"
+            f"vehicles.{name}.fix_sources: the estimator {method!r} takes one source: "
+            "choose 'filter', or name one"
         )
 
 
@@ -67,7 +83,7 @@ PART = Part(
     name="fusion",
     summary="samples and late fixes become the state of the centre of mass",
     topics=(VehicleState, FixAccount, FusionStatus, FusionCalibration),
-    nodes=(NodeRow("fusion", FLIGHT, Weight.URGENT, _fusion),),
+    nodes=(NodeRow("fusion", FLIGHT, Weight.URGENT, Fusion, _fusion),),
     mock_up=FusionOfType,
     vehicle=FusionOfVehicle,
     check=_check,

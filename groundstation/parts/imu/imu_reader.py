@@ -13,9 +13,10 @@ from drivers.imu_block.sensors import (
     specific_force_m_s2,
     usable_readings,
 )
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import Diagnostics, Imu, ImuBytes, ImuOrder, ImuRaw
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.imu.messages import Imu, ImuBytes, ImuOrder, ImuRaw
+from groundstation.parts.operation.messages import Diagnostics
 
 PERIOD_NS = 1_000_000_000
 TICK_S = 1e-3

@@ -3,8 +3,22 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, PACKAGE, U8, U16, U32, U64, Bool, Bytes, Float64Sequence, Float64x2, Message, Text
+from groundstation.declarations.message import (
+    F64,
+    PACKAGE,
+    U8,
+    U16,
+    U32,
+    U64,
+    Bool,
+    Bytes,
+    Float64Sequence,
+    Float64x2,
+    Message,
+    Text,
+)
 from groundstation.declarations.topic import Rank, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImuBytes(Message):

@@ -6,6 +6,7 @@ from typing import ClassVar
 from groundstation.declarations.message import PACKAGE, U8, Float64Sequence, Message, Text, TextSequence
 from groundstation.declarations.topic import Scope, Topic
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SequencePhase(Message):
     """Where the start sequence of a mock-up is; latched."""

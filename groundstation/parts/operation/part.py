@@ -1,4 +1,4 @@
-"""Part ``operation``: how a rig is run: requests, the start sequence, health, calibrations in use, latency."""
+"""Part ``operation``: how a rig is run: requests, start sequence, health, calibrations in use, latency."""
 
 from groundstation.declarations.node import STATION, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
@@ -25,11 +25,12 @@ def _start_sequence(rig: Rig, vehicle: str) -> Node:
     return StartSequence(vehicle, rig.of_type(vehicle, FusionOfType).fusion.rest_s)
 
 
+_START = NodeRow("start_sequence", STATION, Weight.LIGHT, StartSequence, _start_sequence, _starts_by_itself)
 PART = Part(
     name="operation",
     summary="requests and answers, the start sequence, health and latency",
     topics=(Request, Ack, SequencePhase, CalibrationInUse, Diagnostics, Latency),
-    nodes=(NodeRow("start_sequence", STATION, Weight.LIGHT, _start_sequence, _starts_by_itself),),
+    nodes=(_START,),
     vehicle=OperationOfVehicle,
     gauges=GAUGES,
 )

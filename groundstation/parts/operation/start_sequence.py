@@ -6,15 +6,12 @@ a vehicle that somebody stopped or disarmed.
 
 from collections.abc import Iterator
 
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    FusionStatus,
-    Request,
-    SequencePhase,
-    ValveStatus,
-    VehicleMode,
-)
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Request
+from groundstation.parts.fusion.messages import FusionStatus
+from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.valves.messages import ValveStatus, VehicleMode
 
 PERIOD_NS = 100_000_000
 PATIENCE_NS = 1_000_000_000
@@ -57,7 +54,7 @@ class StartSequence(Node):
         if action and (action != self._asked or now_ns - self._asked_ns >= PATIENCE_NS):
             self._asked, self._asked_ns = action, now_ns
             self._request_id += 1
-            yield Request(now_ns, self.vehicle, self._request_id, "start_sequence", action, ())
+            yield Request(now_ns, self.vehicle, self._request_id, "start_sequence", action, "")
 
     def _next(self) -> tuple[str, str, str]:
         """Phase, detail for people, and what to ask for."""

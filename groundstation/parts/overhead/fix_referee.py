@@ -5,11 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
 from groundstation.frames import wrap_angle
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import FixComparison, OverheadFix, StarFix, VehicleState
-from groundstation.nodes.node import Node
-from groundstation.nodes.state_memory import StateMemory
+from groundstation.fusion.state_memory import StateMemory
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.overhead.messages import FixComparison, OverheadFix
+from groundstation.parts.stars.messages import StarFix
 from groundstation.star_tracking.comparison import Referee
 
 REACH_NS = 120_000_000
@@ -40,7 +42,7 @@ class FixReferee(Node):
         self._floor = np.zeros((3, 3))
         for xy_m, heading_rad in (star_floor_std, overhead_floor_std):
             self._floor += np.diag([xy_m**2, xy_m**2, heading_rad**2])
-        self._memory = StateMemory()
+        self._memory: StateMemory[VehicleState] = StateMemory()
         self._stars: deque[StarFix] = deque()
         self._overhead: deque[OverheadFix] = deque()
         self._referee = Referee()

@@ -3,14 +3,35 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, PACKAGE, U8, U16, U32, Bool, Bytes, Float64x3, Float64x9, Message, Text
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.message import (
+    F64,
+    I64,
+    PACKAGE,
+    U16,
+    U32,
+    Bytes,
+    Float64x3,
+    Message,
+    Text,
+)
 from groundstation.declarations.topic import Delivery, Rank, Recorded, Scope, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OverheadImage(Message):
-    """One colour frame of the camera over the table; the stamp is the middle of the exposure."""
+    """One colour picture of the camera over the table; the stamp is its arrival.
 
-    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    Attributes:
+        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not say.
+        height: Rows.
+        width: Columns.
+        encoding: ``bgr8``.
+        step: Bytes of a row.
+        data: Row after row, the top one first.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CameraImage"
     TOPIC: ClassVar = Topic(
         "overhead_image",
         10,
@@ -19,25 +40,19 @@ class OverheadImage(Message):
         delivery=Delivery.NEWEST,
         recorded=Recorded.IMAGES,
     )
+    device_stamp_ns: I64
     height: U32
     width: U32
     encoding: Text
-    is_bigendian: U8
     step: U32
     data: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OverheadFix(Message):
+class OverheadFix(PoseFix):
     """Where the camera over the table sees one mock-up; the stamp is the middle of the exposure.
 
     Attributes:
-        fix: Whether there is a pose; without one the pose is NaN and ``reason`` says why.
-        x_m: Body origin in the table frame.
-        y_m: Body origin in the table frame.
-        heading_rad: Heading in [-pi, pi).
-        covariance: Row-major 3 x 3 of (x, y, heading) in m and rad.
-        stamp_sigma_s: Standard deviation of the stamp against the host's clock.
         circles: Number of circles used.
         whole_circles: How many of them were seen whole.
         misfit_m: RMS distance between the circles and the mock-up's pattern.
@@ -46,12 +61,6 @@ class OverheadFix(Message):
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/OverheadFix"
     TOPIC: ClassVar = Topic("overhead_fix", 10, Rank.SENSOR)
-    fix: Bool
-    x_m: F64
-    y_m: F64
-    heading_rad: F64
-    covariance: Float64x9
-    stamp_sigma_s: F64
     circles: U16
     whole_circles: U16
     misfit_m: F64

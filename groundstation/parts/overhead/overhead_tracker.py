@@ -3,18 +3,20 @@
 import hashlib
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import cv2
 import numpy as np
 
+from drivers.star_camera.exposure import ExposureDelay
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.rig_file import RigFile
 from groundstation.frames import wrap_angle
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import CalibrationInUse, OverheadFix, OverheadImage
-from groundstation.nodes.node import Node
+from groundstation.overhead import tracker as overhead
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead import tracker as overhead
+from groundstation.parts.operation.messages import CalibrationInUse
+from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
 
 
 class OverheadTracker(Node):
@@ -24,7 +26,7 @@ class OverheadTracker(Node):
         vehicles: Those to speak of; other mock-ups that the file of circles knows are told apart from them.
         camera: Calibration file of the camera.
         circles: File that says what each mock-up wears.
-        stamp_sigma_s: Standard deviation of the exposure's stamp.
+        delay: From the middle of the exposure to a picture's stamp.
 
     Raises:
         CalibrationFileError: A file is missing or wrong.
@@ -33,45 +35,50 @@ class OverheadTracker(Node):
     inputs = (OverheadImage,)
     outputs = (OverheadFix, CalibrationInUse)
 
-    def __init__(self, vehicles: Sequence[str], camera: Path, circles: Path, stamp_sigma_s: float) -> None:
+    def __init__(
+        self, vehicles: Sequence[str], camera: RigFile, circles: RigFile, delay: ExposureDelay
+    ) -> None:
         super().__init__("")
         cv2.setNumThreads(1)  # results must not depend on the number of cores
         self._vehicles = tuple(vehicles)
         self._files = (camera, circles)
-        self._tracker = overhead.OverheadTracker(OverheadCamera.load(camera), load_liveries(circles))
-        self._stamp_sigma_s = stamp_sigma_s
+        self._tracker = overhead.OverheadTracker(
+            camera.value(OverheadCamera.load), circles.value(load_liveries)
+        )
+        self._delay = delay
 
     def start(self, now_ns: int) -> Iterator[Message]:
-        content = [path.read_text() for path in self._files]
-        name = " ".join(path.name for path in self._files)
+        content = [file.text() for file in self._files]
+        name = " ".join(file.path.name for file in self._files)
         digest = hashlib.sha256("".join(content).encode()).hexdigest()
         yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns
         assert isinstance(message, OverheadImage)
+        exposure_ns = self._delay.middle_ns(message.device_stamp_ns or message.stamp_ns)
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, 3)
         try:
             answers = self._tracker.look(image)
         except ValueError as error:  # another camera than the file's
             for vehicle in self._vehicles:
-                yield self._refusal(message.stamp_ns, vehicle, str(error))
+                yield self._refusal(exposure_ns, vehicle, str(error))
             return
         for answer in answers:
             if answer.vehicle not in self._vehicles:
                 continue
             if isinstance(answer, overhead.NoOverheadFix):
-                yield self._refusal(message.stamp_ns, answer.vehicle, answer.reason)
+                yield self._refusal(exposure_ns, answer.vehicle, answer.reason)
                 continue
             yield OverheadFix(
-                message.stamp_ns,
+                exposure_ns,
                 answer.vehicle,
                 True,
                 answer.x_m,
                 answer.y_m,
                 wrap_angle(answer.heading_rad),
                 tuple(answer.cov.ravel().tolist()),
-                self._stamp_sigma_s,
+                self._delay.delay_std_s,
                 answer.circles,
                 answer.whole,
                 answer.misfit_m,
@@ -81,5 +88,5 @@ class OverheadTracker(Node):
     def _refusal(self, stamp_ns: int, vehicle: str, reason: str) -> OverheadFix:
         nan = math.nan
         return OverheadFix(
-            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._stamp_sigma_s, 0, 0, nan, reason
+            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._delay.delay_std_s, 0, 0, nan, reason
         )

@@ -13,6 +13,9 @@ from groundstation.parts.overhead.messages import FixComparison, OverheadFix, Ov
 from groundstation.parts.overhead.port import OverheadCameraPort
 from groundstation.parts.overhead.sections import OverheadCameraSection, OverheadOfRig
 
+_TRACKER = "groundstation.parts.overhead.overhead_tracker:OverheadTracker"  # OpenCV loads only where it runs
+_REFEREE = "groundstation.parts.overhead.fix_referee:FixReferee"
+
 
 def _camera(rig: Rig) -> OverheadCameraSection | None:
     return rig.section(OverheadOfRig).overhead_camera
@@ -79,13 +82,26 @@ PART = Part(
     summary="pictures of the table from above become fixes; they are compared with star fixes",
     topics=(OverheadImage, OverheadFix, FixComparison),
     nodes=(
-        NodeRow("overhead_tracker", "overhead", Weight.HEAVY, _tracker, _has_camera, is_of_rig=True),
-        NodeRow("fix_referee", STATION, Weight.LIGHT, _referee, _has_two_sources),
+        NodeRow(
+            "overhead_tracker",
+            "overhead",
+            Weight.HEAVY,
+            _TRACKER,
+            _tracker,
+            _has_camera,
+            is_of_rig=True,
+        ),
+        NodeRow(
+            "fix_referee",
+            STATION,
+            Weight.LIGHT,
+            _REFEREE,
+            _referee,
+            _has_two_sources,
+        ),
     ),
-    ports=(PortRow("overhead_tracker", _port, is_of_rig=True),),
-    fix_sources=(
-        FixSource("overhead", OverheadFix, _has_camera, _floor, "an [overhead_camera] section"),
-    ),
+    ports=(PortRow("overhead_tracker", OverheadCameraPort, _port, is_of_rig=True),),
+    fix_sources=(FixSource("overhead", OverheadFix, _has_camera, _floor, "an [overhead_camera] section"),),
     rig=OverheadOfRig,
     check=_check,
     gauges=GAUGES,

@@ -6,6 +6,7 @@ from typing import ClassVar
 from groundstation.declarations.message import F64, PACKAGE, Bytes, Float64x2, Message
 from groundstation.declarations.topic import Topic
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceBytes(Message):
     """A read of the reference stream (truth of the emulator, or motion capture)."""

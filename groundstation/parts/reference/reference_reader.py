@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from drivers.reference.protocol import PoseParser
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import ReferenceBytes, ReferenceState
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.reference.messages import ReferenceBytes, ReferenceState
 
 
 class ReferenceReader(Node):

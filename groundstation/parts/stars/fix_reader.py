@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 
 from drivers.reference.protocol import PoseParser
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, Request, answer
 from groundstation.frames import wrap_angle
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import Ack, FixBytes, Request, StarFix
-from groundstation.nodes import actions
-from groundstation.nodes.node import Node
+from groundstation.parts.stars.actions import PICTURE
+from groundstation.parts.stars.messages import FixBytes, StarFix
 
 
 class FixReader(Node):
@@ -28,8 +29,8 @@ class FixReader(Node):
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         if isinstance(message, Request):
-            if actions.is_for(message, "star_tracker"):
-                yield actions.answer(message, now_ns, "its fixes come from a stream: there is no star camera")
+            if message.action == PICTURE.name:
+                yield answer(message, now_ns, "its fixes come from a stream: there is no star camera")
             return
         assert isinstance(message, FixBytes)
         for pose in self._parser.feed(message.data):

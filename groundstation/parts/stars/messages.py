@@ -3,29 +3,53 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, I64, PACKAGE, U8, U16, U32, Bool, Bytes, Float32Array, Float64x3, Float64x9, Message, Text, TextSequence
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.message import (
+    F64,
+    I64,
+    PACKAGE,
+    U16,
+    U32,
+    Bool,
+    Bytes,
+    Float32Array,
+    Float64x3,
+    Message,
+    Text,
+    TextSequence,
+)
 from groundstation.declarations.topic import Delivery, Rank, Recorded, Topic
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarImage(Message):
-    """One grey frame of the star camera; the stamp is the middle of the exposure."""
+    """One grey picture of the star camera; the stamp is its arrival.
 
-    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    Attributes:
+        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not say.
+        height: Rows.
+        width: Columns.
+        encoding: ``mono8``.
+        step: Bytes of a row.
+        data: Row after row, the top one first.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CameraImage"
     TOPIC: ClassVar = Topic("star_image", 15, Rank.SENSOR, delivery=Delivery.NEWEST, recorded=Recorded.IMAGES)
+    device_stamp_ns: I64
     height: U32
     width: U32
     encoding: Text
-    is_bigendian: U8
     step: U32
     data: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarSpots(Message):
-    """Spots of light found in one frame, brightest first; stamp and vehicle are the frame's.
+    """Spots of light found in one picture, brightest first; stamps and vehicle are the picture's.
 
     Attributes:
-        arrival_ns: When the frame reached the node that looked into it.
+        device_stamp_ns: When the camera's driver had the picture; 0 where it does not say.
         u_px: Column of each centre, pixel (0, 0) is the centre of the top-left pixel.
         v_px: Row of each centre.
         flux_dn: Light above the background.
@@ -42,7 +66,7 @@ class StarSpots(Message):
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarSpots"
     TOPIC: ClassVar = Topic("star_spots", 15, Rank.SENSOR, recorded=Recorded.SPOTS)
-    arrival_ns: I64
+    device_stamp_ns: I64
     u_px: Float32Array
     v_px: Float32Array
     flux_dn: Float32Array
@@ -58,16 +82,10 @@ class StarSpots(Message):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StarFix(Message):
-    """The answer of the star tracker to one frame; the stamp is the middle of the exposure.
+class StarFix(PoseFix):
+    """The answer of the star tracker to one picture; the stamp is the middle of the exposure.
 
     Attributes:
-        fix: Whether there is a pose; without one the pose is NaN and ``reason`` says why.
-        x_m: Body origin in the table frame.
-        y_m: Body origin in the table frame.
-        heading_rad: Heading in [-pi, pi).
-        covariance: Row-major 3 x 3 of (x, y, heading) in m and rad.
-        stamp_sigma_s: Standard deviation of the stamp against the host's clock.
         stars: Number of stars used.
         mode: How it was found: ``lost-in-space``, ``tracking`` or ``external``.
         reason: Empty, or why there is no fix.
@@ -75,12 +93,6 @@ class StarFix(Message):
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/StarFix"
     TOPIC: ClassVar = Topic("star_fix", 15, Rank.SENSOR)
-    fix: Bool
-    x_m: F64
-    y_m: F64
-    heading_rad: F64
-    covariance: Float64x9
-    stamp_sigma_s: F64
     stars: U16
     mode: Text
     reason: Text

@@ -7,8 +7,8 @@ from groundstation.declarations.fix import FixSource, Floor
 from groundstation.declarations.node import FLIGHT, SKY, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
-from groundstation.declarations.request import Action
 from groundstation.declarations.rig import Rig, check_address
+from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.fix_reader import FixReader
 from groundstation.parts.stars.gauges import GAUGES
 from groundstation.parts.stars.messages import (
@@ -25,7 +25,10 @@ from groundstation.parts.stars.sections import StarCameraSection, StarsOfType, S
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
-PICTURE = Action("picture", "star_tracker", "keep the next picture of the star camera, with its stars named")
+# OpenCV loads only where these run
+_SPOTS = "groundstation.parts.stars.spot_finder:SpotFinder"
+_TRACKER = "groundstation.parts.stars.star_tracker:StarTracker"
+_KEEPER = "groundstation.parts.stars.picture_keeper:PictureKeeper"
 
 
 def _has_camera(rig: Rig, vehicle: str) -> bool:
@@ -105,9 +108,7 @@ def _check(rig: Rig) -> None:
     for name, vehicle in rig.vehicles.items():
         own = rig.vehicle(name, StarsOfVehicle)
         if own.star_camera is not None and rig.of_type(name, StarsOfType).star_camera is None:
-            raise ValueError(
-                f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera"
-            )
+            raise ValueError(f"vehicles.{name}: an address without mock_ups.{vehicle.mock_up}.star_camera")
         check_address(rig, f"vehicles.{name}.star_camera", own.star_camera)
         check_address(rig, f"vehicles.{name}.fixes", own.fixes)
 
@@ -117,12 +118,29 @@ PART = Part(
     summary="pictures of the ceiling become spots, stars and fixes",
     topics=(StarImage, StarSpots, StarFix, StarMatches, StarPicture, SkyChange, FixBytes),
     nodes=(
-        NodeRow("fix_reader", FLIGHT, Weight.LIGHT, _fix_reader, _has_stream),
-        NodeRow("spot_finder", SKY, Weight.HEAVY, _spot_finder, _has_camera),
-        NodeRow("star_tracker", SKY, Weight.HEAVY, _star_tracker, _has_camera),
-        NodeRow("picture_keeper", SKY, Weight.HEAVY, _picture_keeper, _has_camera),
+        NodeRow("fix_reader", FLIGHT, Weight.LIGHT, FixReader, _fix_reader, _has_stream),
+        NodeRow("spot_finder", SKY, Weight.HEAVY, _SPOTS, _spot_finder, _has_camera),
+        NodeRow(
+            "star_tracker",
+            SKY,
+            Weight.HEAVY,
+            _TRACKER,
+            _star_tracker,
+            _has_camera,
+        ),
+        NodeRow(
+            "picture_keeper",
+            SKY,
+            Weight.HEAVY,
+            _KEEPER,
+            _picture_keeper,
+            _has_camera,
+        ),
     ),
-    ports=(PortRow("spot_finder", _camera_port), PortRow("fix_reader", _stream_port)),
+    ports=(
+        PortRow("spot_finder", StarCameraPort, _camera_port),
+        PortRow("fix_reader", FixStreamPort, _stream_port),
+    ),
     actions=(PICTURE,),
     fix_sources=(FixSource("stars", StarFix, _has_stars, _floor, "'star_camera' or 'fixes'"),),
     mock_up=StarsOfType,

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import StarImage, StarMatches, StarPicture
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.stars.messages import StarImage, StarMatches, StarPicture
 
 MEMORY_NS = 3_000_000_000
 MOST_FRAMES = 48

@@ -6,16 +6,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import StarImage, StarSpots
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError
 
 _NONE = np.empty(0, np.float32)
 
 
 class SpotFinder(Node):
-    """Looks for stars in every frame that it is given; a frame it cannot use is said with the reason.
+    """Looks for stars in every frame that it is given; one that it cannot use is reported with the reason.
 
     Args:
         vehicle: Its name.
@@ -35,21 +35,22 @@ class SpotFinder(Node):
         cv2.setNumThreads(1)  # results must not depend on the number of cores
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        del now_ns
         assert isinstance(message, StarImage)
         reason = self._mismatch(message)
         if reason:
-            yield self._unusable(message, now_ns, reason)
+            yield self._unusable(message, reason)
             return
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
         try:
             spots = self._detector.find(image)
         except PictureError as error:
-            yield self._unusable(message, now_ns, str(error))
+            yield self._unusable(message, str(error))
             return
         yield StarSpots(
             message.stamp_ns,
             self.vehicle,
-            now_ns,
+            message.device_stamp_ns,
             _single(spots.u_px),
             _single(spots.v_px),
             _single(spots.flux_dn),
@@ -79,9 +80,11 @@ class SpotFinder(Node):
             )
         return ""
 
-    def _unusable(self, image: StarImage, now_ns: int, reason: str) -> StarSpots:
+    def _unusable(self, image: StarImage, reason: str) -> StarSpots:
         none = (_NONE,) * 6
-        return StarSpots(image.stamp_ns, self.vehicle, now_ns, *none, 0.0, 0.0, 0, 0, False, reason)
+        return StarSpots(
+            image.stamp_ns, self.vehicle, image.device_stamp_ns, *none, 0.0, 0.0, 0, 0, False, reason
+        )
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:

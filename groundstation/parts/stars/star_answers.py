@@ -6,16 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.frames import wrap_angle
-from groundstation.messages.definitions import SkyChange, StarFix, StarMatches, StarSpots, VehicleState
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.stars.messages import SkyChange, StarFix, StarMatches, StarSpots
 from groundstation.star_tracking import fixes, sky_change
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.picture_notes import PictureNotes
 
 
-def fix_message(spots: StarSpots, answer: fixes.StarFix, stamp_sigma_s: float) -> StarFix:
-    """The pose found in a set of spots."""
+def fix_message(spots: StarSpots, answer: fixes.StarFix, exposure_ns: int, stamp_sigma_s: float) -> StarFix:
+    """The pose found in a set of spots, stamped with the middle of their exposure."""
     return StarFix(
-        spots.stamp_ns,
+        exposure_ns,
         spots.vehicle,
         True,
         answer.x_m,
@@ -29,17 +30,17 @@ def fix_message(spots: StarSpots, answer: fixes.StarFix, stamp_sigma_s: float) -
     )
 
 
-def refusal_message(spots: StarSpots, reason: str, stamp_sigma_s: float) -> StarFix:
+def refusal_message(spots: StarSpots, reason: str, exposure_ns: int, stamp_sigma_s: float) -> StarFix:
     """No pose, and why."""
     nowhere, nothing = (math.nan,) * 3, (math.nan,) * 9
     mode = fixes.Mode.LOST_IN_SPACE.value
-    return StarFix(spots.stamp_ns, spots.vehicle, False, *nowhere, nothing, stamp_sigma_s, 0, mode, reason)
+    return StarFix(exposure_ns, spots.vehicle, False, *nowhere, nothing, stamp_sigma_s, 0, mode, reason)
 
 
-def change_message(spots: StarSpots, found: sky_change.SkyChange) -> SkyChange:
+def change_message(spots: StarSpots, found: sky_change.SkyChange, exposure_ns: int) -> SkyChange:
     """A finding of the watchdog, stamped by the exposure that decided."""
     return SkyChange(
-        spots.stamp_ns,
+        exposure_ns,
         spots.vehicle,
         found.change.value,
         found.star,

@@ -2,23 +2,19 @@
 
 import hashlib
 from collections.abc import Iterator
-from pathlib import Path
 
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    Ack,
-    CalibrationInUse,
-    Request,
-    SkyChange,
-    StarFix,
-    StarMatches,
-    StarSpots,
-    VehicleState,
-)
-from groundstation.nodes import actions, star_answers
-from groundstation.nodes.node import Node
-from groundstation.nodes.picture_choice import PictureChoice
-from groundstation.nodes.state_memory import StateMemory
+from drivers.star_camera.exposure import ExposureDelay
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.declarations.rig_file import RigFile
+from groundstation.fusion.state_memory import StateMemory
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.operation.messages import CalibrationInUse
+from groundstation.parts.stars import star_answers
+from groundstation.parts.stars.actions import PICTURE
+from groundstation.parts.stars.messages import SkyChange, StarFix, StarMatches, StarSpots
+from groundstation.parts.stars.picture_choice import PictureChoice
 from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
@@ -43,7 +39,7 @@ class StarTracker(Node):
         vehicle: Its name.
         camera: Calibration file of the camera.
         ceiling: Star catalogue.
-        stamp_sigma_s: Standard deviation of the exposure's stamp.
+        delay: From the middle of the exposure to a picture's stamp.
         settings: Of the search, exposure and shutter included.
 
     Raises:
@@ -56,24 +52,24 @@ class StarTracker(Node):
     def __init__(
         self,
         vehicle: str,
-        camera: Path,
-        ceiling: Path,
-        stamp_sigma_s: float,
+        camera: RigFile,
+        ceiling: RigFile,
+        delay: ExposureDelay,
         settings: tracker.TrackerSettings,
     ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
-        self._stars, self._lens = StarCatalogue.load(ceiling), CameraCalibration.load(camera)
+        self._stars, self._lens = ceiling.value(StarCatalogue.load), camera.value(CameraCalibration.load)
         self._tracker = tracker.StarTracker(self._stars, self._lens, settings)
         self._watch = SkyWatch(self._stars, self._lens, rays=self._tracker.rays)
         self._governor = PriorGovernor()
-        self._states = StateMemory()
+        self._states: StateMemory[VehicleState] = StateMemory()
         self._choice = PictureChoice()
-        self._stamp_sigma_s = stamp_sigma_s
+        self._delay = delay
 
     def start(self, now_ns: int) -> Iterator[Message]:
-        content = [path.read_text() for path in self._files]
-        name = " ".join(path.name for path in self._files)
+        content = [file.text() for file in self._files]
+        name = " ".join(file.path.name for file in self._files)
         digest = hashlib.sha256("".join(content).encode()).hexdigest()
         yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
 
@@ -84,35 +80,44 @@ class StarTracker(Node):
             case StarSpots(reason="") as spots:
                 yield from self._solve(spots)
             case StarSpots() as spots:
-                yield star_answers.refusal_message(spots, spots.reason, self._stamp_sigma_s)
-            case Request() if actions.is_for(message, "star_tracker"):
-                reason = actions.refusal(message)
-                if not reason:
-                    self._choice.ask()
-                yield actions.answer(message, now_ns, reason)
+                yield star_answers.refusal_message(spots, spots.reason, *self._exposure(spots))
+            case Request() if message.action == PICTURE.name:
+                try:
+                    PICTURE.read(message)
+                except ArgumentError as error:
+                    yield answer(message, now_ns, str(error))
+                    return
+                self._choice.ask()
+                yield answer(message, now_ns)
 
     def _solve(self, spots: StarSpots) -> Iterator[Message]:
-        state = self._states.at(spots.stamp_ns)
+        exposure_ns, sigma_s = self._exposure(spots)
+        state = self._states.at(exposure_ns)
         belief = motion = None
         if state is not None:
-            belief = star_answers.belief_of(state, self._stamp_sigma_s)
+            belief = star_answers.belief_of(state, sigma_s)
             motion = star_answers.motion_of(state)
         lights = star_answers.spots_of(spots)
         answer = self._tracker.solve(lights, self._governor.admit(belief), motion)
         self._governor.note(answer, belief)
         if isinstance(answer, NoFix):
             reason = f"{answer.reason.value}: {answer.detail}"
-            yield star_answers.refusal_message(spots, reason, self._stamp_sigma_s)
+            yield star_answers.refusal_message(spots, reason, exposure_ns, sigma_s)
             yield from self._explain(spots, lights, answer, answer.reason.value, reason, belief)
             return
-        yield star_answers.fix_message(spots, answer, self._stamp_sigma_s)
+        yield star_answers.fix_message(spots, answer, exposure_ns, sigma_s)
         yield from self._explain(spots, lights, answer, "", "", belief)
         if self._is_still(motion):
             changes = self._watch.note(answer, lights)
             if changes:
                 self._tracker.drop(self._watch.dropped)
             for found in changes:
-                yield star_answers.change_message(spots, found)
+                yield star_answers.change_message(spots, found, exposure_ns)
+
+    def _exposure(self, spots: StarSpots) -> tuple[int, float]:
+        """Middle of the exposure and its standard deviation: from the driver's stamp where there is one."""
+        stamp_ns = spots.device_stamp_ns or spots.stamp_ns
+        return self._delay.middle_ns(stamp_ns), self._delay.delay_std_s
 
     def _explain(
         self,

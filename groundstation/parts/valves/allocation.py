@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.state import Wrench as BodyWrench
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import ValveCommand, ValveDemand, Wrench
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 
 
 class Allocation(Node):

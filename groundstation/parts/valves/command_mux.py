@@ -12,21 +12,22 @@ from groundstation.control.mux import MuxConfig, Selection, Source
 from groundstation.control.state import ControlState
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.control.vehicle import VehicleModel
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import Ack, Request, ValveDemand, ValveSelection, VehicleState
-from groundstation.nodes.actions import answer, is_for, refusal
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.valves.actions import MULTIPLEXER
+from groundstation.parts.valves.messages import ValveDemand, ValveSelection
 
 PERIOD_NS = 20_000_000
 CLOSED = bytes(8)
 RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
 SLOPE_M_S2 = 0.005  # a table half a milliradian off level
-LONGEST_PUSH_S = 10.0  # an operator who went away must not push for ever
 REACTION_S = 0.15  # age of the state, a modulation period, the opening of a valve
 
 
 class CommandMux(Node):
-    """Says every 20 ms, and at once on a new demand, what the valves are to do and who wants it.
+    """Publishes every 20 ms, and at once on a new demand, what the valves are to do and who wants it.
 
     Args:
         vehicle: Its name.
@@ -39,6 +40,7 @@ class CommandMux(Node):
 
     inputs = (ValveDemand, VehicleState, Request)
     outputs = (ValveSelection, Ack)
+    trigger = ValveDemand
 
     def __init__(
         self,
@@ -85,9 +87,8 @@ class CommandMux(Node):
                 yield self._select(now_ns)
             case Request(action="release"):
                 self._choice.release_stop()
-            case Request() if is_for(message, "command_mux"):
-                reason = refusal(message) or self._carry_out(message, now_ns)
-                yield answer(message, now_ns, reason)
+            case Request() if message.action in MULTIPLEXER:
+                yield answer(message, now_ns, self._carry_out(message, now_ns))
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         if self._brake_asked:
@@ -100,12 +101,15 @@ class CommandMux(Node):
 
     def _carry_out(self, request: Request, now_ns: int) -> str:
         """Do what was asked; the reason if it cannot be done."""
+        try:
+            given = MULTIPLEXER[request.action].read(request)
+        except ArgumentError as error:
+            return str(error)
         if request.action == "push":
-            force_x_n, force_y_n, torque_nm, span_s = request.argument
-            if not 0.0 < span_s <= LONGEST_PUSH_S:
-                return f"a push lasts up to {LONGEST_PUSH_S:g} s, asked for {span_s:g} s"
-            self._push = BodyWrench((force_x_n, force_y_n), torque_nm)
-            self._push_until_ns, self._push_due_ns = now_ns + round(span_s * 1e9), now_ns
+            self._push = BodyWrench(
+                (float(given["force_x_n"]), float(given["force_y_n"])), float(given["torque_nm"])
+            )
+            self._push_until_ns, self._push_due_ns = now_ns + round(float(given["span_s"]) * 1e9), now_ns
             self._hand.reset()
             return ""
         self._brake_asked = request.action == "brake"

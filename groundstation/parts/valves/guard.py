@@ -7,32 +7,34 @@ from drivers.valve_bus.guard import Guard as Gate
 from drivers.valve_bus.guard_account import Verdict
 from drivers.valve_bus.messages import Arm, StopReason
 from drivers.valve_bus.messages import ValveCommand as Command
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    NO_STOP,
-    Ack,
-    Diagnostics,
-    Request,
-    ValveCommand,
-    ValveSelection,
-    VehicleMode,
-)
-from groundstation.nodes.actions import answer, is_for, refusal
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.valves.actions import GUARD
+from groundstation.parts.valves.messages import NO_STOP, ValveCommand, ValveSelection, VehicleMode
 
 PERIOD_NS = 20_000_000
 DIAGNOSTICS_EVERY = 50
 
 
 class Guard(Node):
-    """Lets commands through while the vehicle is armed and the selection is fresh; closes otherwise."""
+    """Lets commands through while the vehicle is armed and the selection is fresh; closes otherwise.
+
+    Args:
+        vehicle: Its name.
+        gate: The gate before its valves.
+        known: Names of all actions; it refuses what none of them is.
+    """
 
     inputs = (ValveSelection, Request)
     outputs = (ValveCommand, VehicleMode, Ack, Diagnostics)
+    trigger = ValveSelection
 
-    def __init__(self, vehicle: str, gate: Gate) -> None:
+    def __init__(self, vehicle: str, gate: Gate, known: frozenset[str]) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._gate = gate
+        self._known = known
         self._ticks = 0
 
     def start(self, now_ns: int) -> Iterator[Message]:
@@ -46,8 +48,8 @@ class Guard(Node):
                 )
                 if self._gate.update(now_ns, command) is Verdict.NEW_PULSE:
                     yield self._output(now_ns)
-            case Request() if is_for(message, "guard"):
-                reason = refusal(message) or self._carry_out(message.action, now_ns)
+            case Request() if message.action in GUARD or message.action not in self._known:
+                reason = self._carry_out(message, now_ns)
                 yield answer(message, now_ns, reason)
                 if not reason:
                     yield self._mode(now_ns, message.author, message.action)
@@ -66,9 +68,15 @@ class Guard(Node):
         self._gate.stop(now_ns, StopReason.SHUTDOWN)
         yield self._output(now_ns)
 
-    def _carry_out(self, action: str, now_ns: int) -> str:
+    def _carry_out(self, request: Request, now_ns: int) -> str:
         """Do what was asked; the reason if it cannot be done."""
-        match action:
+        if request.action not in GUARD:
+            return f"unknown action '{request.action}' (known: {', '.join(sorted(self._known))})"
+        try:
+            GUARD[request.action].read(request)
+        except ArgumentError as error:
+            return str(error)
+        match request.action:
             case "arm":
                 if not self._gate.arm(now_ns):
                     return "a stop is latched: release it first"

@@ -51,7 +51,9 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
 def _guard(rig: Rig, vehicle: str) -> Node:
     limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
     gate = Gate(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
-    return Guard(vehicle, gate, frozenset(rig.tables.actions))
+    nodes = rig.tables.nodes
+    known = (row.name for row in rig.tables.actions.values() if nodes[row.answered_by].vehicles(rig))
+    return Guard(vehicle, gate, frozenset(known))
 
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:
@@ -97,12 +99,12 @@ PART = Part(
     summary="the wrench becomes pulses; one source is chosen, guarded and sent over the valve bus",
     topics=(CanIn, ValveStatus, VehicleMode, ValveDemand, ValveSelection, ValveCommand, CanOut),
     nodes=(
-        NodeRow("command_mux", COMMANDS, Weight.URGENT, _command_mux),
-        NodeRow("guard", COMMANDS, Weight.URGENT, _guard),
-        NodeRow("valve_writer", COMMANDS, Weight.URGENT, _valve_writer),
-        NodeRow("allocation", FLIGHT, Weight.LIGHT, _allocation),
+        NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMux, _command_mux),
+        NodeRow("guard", COMMANDS, Weight.URGENT, Guard, _guard),
+        NodeRow("valve_writer", COMMANDS, Weight.URGENT, ValveWriter, _valve_writer),
+        NodeRow("allocation", FLIGHT, Weight.LIGHT, Allocation, _allocation),
     ),
-    ports=(PortRow("valve_writer", _port, is_of_rig=True),),
+    ports=(PortRow("valve_writer", ValveBusPort, _port, is_of_rig=True),),
     actions=(*GUARD.values(), *MULTIPLEXER.values(), *FLOAT_AIR.values()),
     rig=ValvesOfRig,
     vehicle=ValvesOfVehicle,

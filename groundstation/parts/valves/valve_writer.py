@@ -6,18 +6,11 @@ from collections.abc import Iterator
 from drivers.valve_bus import messages as bus
 from drivers.valve_bus.frame import CanFrame
 from drivers.valve_bus.protocol import decode, encode
-from groundstation.messages.base import Message
-from groundstation.messages.definitions import (
-    NO_STOP,
-    Ack,
-    CanIn,
-    CanOut,
-    Request,
-    ValveCommand,
-    ValveStatus,
-)
-from groundstation.nodes.actions import answer, is_for, refusal
-from groundstation.nodes.node import Node
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.valves.actions import FLOAT_AIR
+from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
 
 FLOAT_RETRY_NS = 100_000_000
 
@@ -42,12 +35,15 @@ class ValveWriter(Node):
                 yield from self._command(message, now_ns)
             case CanIn():
                 yield from self._heard(message, now_ns)
-            case Request() if is_for(message, "valve_writer"):
-                reason = refusal(message)
-                if not reason:
-                    self._wanted_float = message.action == "float_on"
-                    yield self._float_order(now_ns)
-                yield answer(message, now_ns, reason)
+            case Request() if message.action in FLOAT_AIR:
+                try:
+                    FLOAT_AIR[message.action].read(message)
+                except ArgumentError as error:
+                    yield answer(message, now_ns, str(error))
+                    return
+                self._wanted_float = message.action == "float_on"
+                yield self._float_order(now_ns)
+                yield answer(message, now_ns)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         if self._wanted_float is not None and self._wanted_float is not self._floating:

@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import _factory
-from groundstation.messages.definitions import SequencePhase, StarFix, ValveStatus, VehicleState
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.valves.messages import ValveStatus
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
-from groundstation.runtime.replay import ReplayRunner
-from groundstation.runtime.rig import parse_rig
+from groundstation.rig.read import parse_rig
+from groundstation.runners.replay import ReplayRunner
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +35,7 @@ def fly_and(launch, rig, name, number):
 
 def of(path, kind, vehicle):
     with Recording(path) as recording:
-        return [row.payload for row in recording.delivered([topic_of(kind)], [vehicle])]
+        return [row.payload for row in recording.delivered([kind.TOPIC], [vehicle])]
 
 
 def longest_silence_s(payloads):

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.bus.topics import topic_of
-from groundstation.messages.definitions import ValveCommand, ValveStatus
+from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 from groundstation.recording.reader import Recording
 
 pytestmark = pytest.mark.slow
@@ -17,7 +16,7 @@ RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 
 def newest(path, kind, vehicle):
     with Recording(path) as recording:
-        return list(recording.delivered([topic_of(kind)], [vehicle]))[-1].payload
+        return list(recording.delivered([kind.TOPIC], [vehicle]))[-1].payload
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

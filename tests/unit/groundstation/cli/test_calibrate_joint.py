@@ -5,19 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import TableMap
-from groundstation.runtime.lockstep_run import run_lockstep
-from groundstation.runtime.rig import load_rig
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 TILT = (0.0003, -0.0001)
 
 
 @pytest.mark.slow
-def test_a_recording_gives_constants_and_slope_map_with_sigmas(tmp_path):
+def test_a_recording_gives_constants_and_slope_map_with_sigmas(tmp_path, groundstation):
     text = (RIGS / "drawn_fixes.toml").read_text()
     rig_path, path = tmp_path / "rig.toml", tmp_path / "run.mcap"
     rig_path.write_text(
@@ -28,8 +26,8 @@ def test_a_recording_gives_constants_and_slope_map_with_sigmas(tmp_path):
     )
     run_lockstep(load_rig(rig_path), rig_path, path, 45.0, 4, lambda *_: None)
     out, table_map, plot = (tmp_path / name for name in ("joint.toml", "map.toml", "joint.png"))
-    arguments = ["joint", str(path), "--out", str(out), "--table-map", str(table_map), "--plot", str(plot)]
-    result = CliRunner().invoke(app, arguments)
+    words = ("calibrate", "joint", path, "--out", out, "--table-map", table_map, "--plot", plot)
+    result = groundstation(*words)
     assert result.exit_code == 0, result.output
     found = tomllib.loads(out.read_text())
     assert abs(found["gyro_scale"]["value"] - (1.0 - 1.0 / 1.01)) < 4.0 * found["gyro_scale"]["std"] < 4e-3

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from groundstation.cli.main import call
-from groundstation.runtime.running import RunningRig, find_running
+from groundstation.launch.running import RunningRig, find_running
 
 
 @pytest.fixture(autouse=True)

@@ -4,24 +4,24 @@ import tomllib
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.calibrate import app
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 
-def run(*arguments: object) -> None:
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
-    if isinstance(result.exception, UsageError):
-        raise result.exception
-    assert result.exit_code == 0, result.output
+@pytest.fixture
+def run(groundstation):
+    def call(*words: object) -> None:
+        result = groundstation("calibrate", *words)
+        assert result.exit_code == 0, result.output
+
+    return call
 
 
 def truth(folder):
     return np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
 
 
-def test_the_offset_at_rest_is_bias_less_slope(make_folder, tmp_path):
+def test_the_offset_at_rest_is_bias_less_slope(run, make_folder, tmp_path):
     folder = make_folder(scenario="station", seed=51, duration_s=20.0)
     run("zero-offset", folder, "--out", tmp_path / "rest.toml")
     found = tomllib.loads((tmp_path / "rest.toml").read_text())
@@ -34,7 +34,7 @@ def test_the_offset_at_rest_is_bias_less_slope(make_folder, tmp_path):
     assert found["made_utc"].tzinfo is not None
 
 
-def test_the_published_fit_finds_the_offsets_in_flight(make_folder, tmp_path):
+def test_the_published_fit_finds_the_offsets_in_flight(run, make_folder, tmp_path):
     folder = make_folder(scenario="station", seed=51, duration_s=40.0)
     run("zero-offset-fit", folder, "--start-s", 18, "--end-s", 38, "--out", tmp_path / "fit.toml")
     found = tomllib.loads((tmp_path / "fit.toml").read_text())
@@ -48,7 +48,7 @@ def test_the_published_fit_finds_the_offsets_in_flight(make_folder, tmp_path):
     assert found["residual"]["position"]["value"] < 0.02
 
 
-def test_the_gyro_scale_is_found_from_a_spin(make_folder, tmp_path):
+def test_the_gyro_scale_is_found_from_a_spin(run, make_folder, tmp_path):
     folder = make_folder(scenario="spin", seed=52, duration_s=60.0)
     run("gyro-scale", folder, "--out", tmp_path / "s.toml", "--plot", tmp_path / "s.png")
     found = tomllib.loads((tmp_path / "s.toml").read_text())
@@ -57,7 +57,7 @@ def test_the_gyro_scale_is_found_from_a_spin(make_folder, tmp_path):
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_allan_deviation_of_a_rest_gives_the_white_noise(make_folder, tmp_path):
+def test_allan_deviation_of_a_rest_gives_the_white_noise(run, make_folder, tmp_path):
     folder = make_folder(scenario="rest", seed=53, duration_s=60.0)
     run("allan", folder, "--out", tmp_path / "a.toml", "--plot", tmp_path / "a.png")
     found = tomllib.loads((tmp_path / "a.toml").read_text())
@@ -75,14 +75,14 @@ def test_allan_deviation_of_a_rest_gives_the_white_noise(make_folder, tmp_path):
         (("zero-offset-fit", "--start-s", 100, "--end-s", 110), "no packets"),
     ],
 )
-def test_what_cannot_be_calibrated_is_said_in_one_sentence(make_folder, tmp_path, command, words):
+def test_what_cannot_be_calibrated_is_said_in_one_sentence(run, make_folder, tmp_path, command, words):
     folder = make_folder(scenario="station", seed=51, duration_s=20.0)
     with pytest.raises(UsageError, match=words):
         run(command[0], folder, *command[1:], "--out", tmp_path / "x.toml")
     assert not (tmp_path / "x.toml").exists()
 
 
-def test_a_rest_somebody_leant_on_is_refused(make_folder, tmp_path):
+def test_a_rest_somebody_leant_on_is_refused(run, make_folder, tmp_path):
     folder = make_folder(scenario="station", seed=51, duration_s=20.0)
     lines = (folder / "imu.csv").read_text().splitlines()
     for k in range(1, 700):

@@ -1,8 +1,6 @@
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.calibrate import app
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 RIG = "examples/rigs/drawn_fixes.toml"
 
@@ -12,10 +10,13 @@ RIG = "examples/rigs/drawn_fixes.toml"
     [
         (("imu", RIG, "--out", "x.toml"), "--guided"),
         (("imu", RIG, "--guided", "--vehicle", "nobody", "--out", "x.toml"), "no vehicle 'nobody'"),
+        (("guided", "imu", RIG, "--vehicle", "nobody", "--out", "x.toml"), "no vehicle 'nobody'"),
+        (("guided", "lens", RIG, "--out", "x.toml"), "no guided calibration 'lens'; installed: imu"),
     ],
 )
-def test_what_is_missing_is_said_before_anything_is_touched(pytestconfig, monkeypatch, arguments, words):
+def test_what_is_missing_is_said_before_anything_is_touched(
+    groundstation, pytestconfig, monkeypatch, arguments, words
+):
     monkeypatch.chdir(pytestconfig.rootpath)
-    result = CliRunner().invoke(app, list(arguments))
-    assert isinstance(result.exception, UsageError), result.output
-    assert words in str(result.exception)
+    with pytest.raises(UsageError, match=words):
+        groundstation("calibrate", *arguments)

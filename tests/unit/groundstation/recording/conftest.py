@@ -3,16 +3,20 @@
 import numpy as np
 import pytest
 
+from groundstation.bus.cdr import ros_fields
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import Scope, topic_of
-from groundstation.messages import definitions as m
-from groundstation.messages.cdr import ros_fields
+from groundstation.bus.journal import Journal
+from groundstation.declarations.topic import Scope
+from groundstation.parts.control.messages import Wrench
+from groundstation.parts.imu.messages import ImuBytes
+from groundstation.parts.stars.messages import StarImage, StarSpots
+from groundstation.parts.valves.messages import CanIn
 
 PERIOD_NS = 10_000_000
 
 
 def envelope_of(payload, sequence, process, publish_ns):
-    topic = topic_of(type(payload))
+    topic = payload.TOPIC
     owner = process if topic.scope is Scope.PROCESS else payload.vehicle
     return Envelope(topic, owner, sequence, publish_ns)
 
@@ -20,7 +24,7 @@ def envelope_of(payload, sequence, process, publish_ns):
 def spots(stamp_ns, vehicle, some):
     """Three spots; every array of the payload holds ``some``."""
     empty = {"float32[]": some, "float64": 1.5, "int64": stamp_ns, "uint16": 3, "bool": False, "string": ""}
-    return m.StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(m.StarSpots)))
+    return StarSpots(stamp_ns, vehicle, *(empty[kind] for _, kind in ros_fields(StarSpots)))
 
 
 def fly(steps: int, seed: int = 7) -> list[Delivered]:
@@ -29,7 +33,7 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     counts: dict = {}
     flight = []
 
-    def say(payload, publish_ns):
+    def publish(payload, publish_ns):
         key = (type(payload), payload.vehicle)
         counts[key] = counts.get(key, 0) + 1
         flight.append(Delivered(envelope_of(payload, counts[key], "flight", publish_ns), payload))
@@ -37,15 +41,15 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     for step in range(steps):
         now_ns = (step + 1) * PERIOD_NS
         for vehicle in ("alpha", "bravo"):
-            say(m.ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
+            publish(ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
             force = tuple(random.normal(size=2).tolist())
-            say(m.Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
-        say(m.CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
+            publish(Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
+        publish(CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
         if step % 7 == 0:
-            say(m.StarImage(now_ns, "alpha", 8, 8, "mono8", 0, 8, random.bytes(64)), now_ns)
-            say(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
+            publish(StarImage(now_ns, "alpha", now_ns - 1, 8, 8, "mono8", 8, random.bytes(64)), now_ns)
+            publish(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
         if step % 10 == 9:
-            say(m.Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
+            publish(Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
     return flight
 
 

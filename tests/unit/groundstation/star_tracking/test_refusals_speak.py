@@ -6,11 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from groundstation.messages import definitions as m
-from groundstation.nodes.picture_keeper import PictureKeeper
-from groundstation.nodes.spot_finder import SpotFinder
-from groundstation.nodes.star_answers import notes_of
-from groundstation.nodes.star_tracker import StarTracker
+from groundstation.declarations.request import Ack, Request
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.stars.messages import StarFix, StarImage, StarMatches, StarPicture
+from groundstation.parts.stars.picture_keeper import PictureKeeper
+from groundstation.parts.stars.spot_finder import SpotFinder
+from groundstation.parts.stars.star_answers import notes_of
+from groundstation.parts.stars.star_tracker import StarTracker
 from groundstation.star_tracking.picture_drawing import draw_notes
 from groundstation.star_tracking.picture_notes import NO_SPOT, SpotKind
 from groundstation.star_tracking.tracker import TrackerSettings
@@ -50,14 +52,12 @@ class Sky:
         """All that is said of the next picture."""
         self.stamp_ns += PERIOD_NS
         height, width = image.shape
-        return self.tell(
-            m.StarImage(self.stamp_ns, "alpha", height, width, "mono8", 0, width, image.tobytes())
-        )
+        return self.tell(StarImage(self.stamp_ns, "alpha", height, width, "mono8", 0, width, image.tobytes()))
 
     def believe(self, pose, velocity=(0.0, 0.0), rate_rad_s=0.0):
         """The filter's state at the exposure that comes next."""
         stamp_ns = self.stamp_ns + PERIOD_NS
-        state = m.VehicleState(
+        state = VehicleState(
             stamp_ns, "alpha", pose[:2], pose[2], velocity, rate_rad_s, (1e-3,) * 3, "flying", 0
         )
         self.tell(state)
@@ -69,7 +69,7 @@ def sky(tmp_path, painter):
 
 
 def reason_of(said):
-    (fix,) = said[m.StarFix]
+    (fix,) = said[StarFix]
     assert fix.fix == (fix.reason == "")
     return fix.reason.partition(":")[0]
 
@@ -83,7 +83,7 @@ def test_a_refused_picture_comes_without_loss_and_its_stars_lie_where_the_filter
     sky.believe(POSE)
     said = sky.show(image)
     assert reason_of(said) == "too few stars"
-    (picture,), (matches,) = said[m.StarPicture], said[m.StarMatches]
+    (picture,), (matches,) = said[StarPicture], said[StarMatches]
     assert picture.stamp_ns == matches.stamp_ns == sky.stamp_ns
     assert picture.format == "png"
     back = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -105,7 +105,7 @@ def test_without_any_belief_the_lights_are_shown_and_no_star(sky):
     image = np.clip(rng.normal(10, 1, (480, 640)), 0, 255).astype(np.uint8)
     cv2.circle(image, (200, 100), 2, 200, -1)
     said = sky.show(image)
-    notes = notes_of(said[m.StarMatches][0])
+    notes = notes_of(said[StarMatches][0])
     assert (notes.basis, notes.stars, notes.kind.tolist()) == ("", (), [SpotKind.LIGHT])
 
 
@@ -134,11 +134,11 @@ def test_streaks_are_called_blurred_with_and_without_a_known_motion(tmp_path, pa
 
 def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     image = painter.paint(np.random.default_rng(5), POSE)
-    assert m.StarMatches not in sky.show(image)
-    (ack,) = sky.tell(m.Request(sky.stamp_ns, "alpha", 7, "me", "picture", ()))[m.Ack]
+    assert StarMatches not in sky.show(image)
+    (ack,) = sky.tell(Request(sky.stamp_ns, "alpha", 7, "me", "picture", ()))[Ack]
     assert ack.accepted
     said = sky.show(image)
-    (fix,), (matches,) = said[m.StarFix], said[m.StarMatches]
+    (fix,), (matches,) = said[StarFix], said[StarMatches]
     notes = notes_of(matches)
     assert notes.basis == "fix"
     assert int((notes.kind == SpotKind.STAR).sum()) == fix.stars
@@ -146,18 +146,18 @@ def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     assert int(seen.sum()) == fix.stars
     gap = np.hypot(*(notes.star_px[seen] - notes.spot_px[notes.spot_of_star[seen]]).T)
     assert gap.max() < 0.5
-    assert m.StarPicture in said
-    assert m.StarMatches not in sky.show(image)
+    assert StarPicture in said
+    assert StarMatches not in sky.show(image)
 
 
 def test_a_picture_that_is_no_longer_held_is_not_said(sky, painter):
     keeper = PictureKeeper("alpha")
     dark = np.zeros((480, 640), np.uint8)
     said = sky.show(dark)
-    (image,), (matches,) = said[m.StarImage], said[m.StarMatches]
+    (image,), (matches,) = said[StarImage], said[StarMatches]
     assert list(keeper.receive(image, 0)) == []
     assert len(list(keeper.receive(matches, 0))) == 1
-    late = m.StarImage(image.stamp_ns + 4_000_000_000, "alpha", 480, 640, "mono8", 0, 640, dark.tobytes())
+    late = StarImage(image.stamp_ns + 4_000_000_000, "alpha", 480, 640, "mono8", 0, 640, dark.tobytes())
     assert list(keeper.receive(late, 0)) == []
     assert list(keeper.receive(matches, 0)) == []
 
@@ -167,8 +167,8 @@ def test_the_drawing_rings_stars_green_and_crosses_missing_ones_red(sky, painter
     missing = painter.visible(POSE, margin_px=60)[0]
     lit[missing] = False
     image = painter.paint(np.random.default_rng(6), POSE, lit=lit)
-    sky.tell(m.Request(sky.stamp_ns, "alpha", 8, "me", "picture", ()))
-    notes = notes_of(sky.show(image)[m.StarMatches][0])
+    sky.tell(Request(sky.stamp_ns, "alpha", 8, "me", "picture", ()))
+    notes = notes_of(sky.show(image)[StarMatches][0])
     drawn = draw_notes(image, notes, "a fix").astype(int)
     assert drawn.shape[0] > 2 * 480
     assert drawn.shape[1:] == (2 * 640, 3)
@@ -184,16 +184,16 @@ def test_the_drawing_rings_stars_green_and_crosses_missing_ones_red(sky, painter
 @pytest.mark.parametrize(
     ("image", "words"),
     [
-        (m.StarImage(1, "alpha", 240, 320, "mono8", 0, 320, bytes(240 * 320)), "320 x 240 px"),
-        (m.StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640 - 1)), "cut short"),
-        (m.StarImage(1, "alpha", 480, 640, "bgr8", 0, 1920, bytes(3 * 480 * 640)), "bgr8"),
-        (m.StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640)), "no light spots"),
-        (m.StarImage(1, "alpha", 480, 640, "mono8", 0, 640, b"\xff" * (480 * 640)), "flooded"),
+        (StarImage(1, "alpha", 240, 320, "mono8", 0, 320, bytes(240 * 320)), "320 x 240 px"),
+        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640 - 1)), "cut short"),
+        (StarImage(1, "alpha", 480, 640, "bgr8", 0, 1920, bytes(3 * 480 * 640)), "bgr8"),
+        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640)), "no light spots"),
+        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, b"\xff" * (480 * 640)), "flooded"),
     ],
     ids=["wrong size", "torn", "colour", "black", "saturated"],
 )
 def test_a_frame_that_cannot_be_used_is_refused_in_words(sky, image, words):
-    (fix,) = sky.tell(image)[m.StarFix]
+    (fix,) = sky.tell(image)[StarFix]
     assert not fix.fix
     assert words in fix.reason
     assert "\n" not in fix.reason

@@ -6,10 +6,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.result import Provenance
-from calibration.sky import CalibrationRefusedError
 from calibration.sky.board import Board
 from calibration.sky.delay import delay_from_headings
 from calibration.sky.lens import lens_from_board, lens_from_stars, mount_from_turn
@@ -17,7 +16,6 @@ from calibration.sky.residual_structure import find_structure
 from calibration.sky.survey.surveyed_sky import Anchor
 from calibration.sky.survey.sweep import survey_sweep
 from calibration.sky.survey.verification import verify
-from groundstation.cli.star_tracker import app
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.stamp_delay import read_delay
 
@@ -194,7 +192,7 @@ def test_what_gives_no_calibration_is_refused_in_one_sentence(camera):
         lens_from_board([], Board(9, 6, 0.03), camera=camera)
 
 
-def test_the_delay_command_writes_what_the_rig_reads(tmp_path):
+def test_the_delay_command_writes_what_the_rig_reads(tmp_path, groundstation):
     t = np.arange(0.0, 30.0, 0.01)
     rate = np.sin(0.9 * t)
     arrival = np.arange(3.0, 27.0, 0.25)
@@ -204,8 +202,7 @@ def test_the_delay_command_writes_what_the_rig_reads(tmp_path):
     rows = [f"{a:.6f},{b:.9f}" for a, b in zip(arrival, heading, strict=True)]
     (tmp_path / "stars.csv").write_text("\n".join(["t_arrival_s,heading_rad", *rows]) + "\n")
     out, plot = tmp_path / "delay.toml", tmp_path / "delay.png"
-    call = ["delay", str(tmp_path), "--out", str(out), "--plot", str(plot)]
-    result = CliRunner().invoke(app, call, catch_exceptions=False)
+    result = groundstation("star-tracker", "delay", tmp_path, "--out", out, "--plot", plot)
     assert "one sigma" in result.stdout
     assert read_delay(out).delay_s == pytest.approx(0.06, abs=6e-3)  # half a gyro window is part of it
     assert plot.read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,74 @@
+"""A whole lockstep run of a rig into a recording, in virtual time."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.rig import Rig
+from groundstation.parts.operation.messages import Latency
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.writer import Recorder
+from groundstation.rig.provenance import recording_info
+from groundstation.runners.make_runner import make_runner, seed_of
+from groundstation.watch.ledger import Ledger
+
+Progress = Callable[[str, float], None]
+LATENCY_PERIOD_NS = 1_000_000_000
+
+
+class _LatencyReporter:
+    """Publishes the ledger's summaries once a second of virtual time."""
+
+    def __init__(self, vehicles: tuple[str, ...], recorder: Recorder) -> None:
+        self._vehicles = vehicles
+        self._ledger = Ledger()
+        self._recorder = recorder
+        self._due_ns = LATENCY_PERIOD_NS
+        self._sequence = 0
+
+    def __call__(self, delivered: Delivered, now_ns: int) -> None:
+        self._ledger.take_delivered(delivered)
+        if now_ns < self._due_ns:
+            return
+        self._due_ns += LATENCY_PERIOD_NS
+        self._sequence += 1
+        for vehicle in self._vehicles:
+            summary = self._ledger.summary(vehicle, now_ns)
+            envelope = Envelope(Latency.TOPIC, vehicle, self._sequence, now_ns)
+            self._recorder.record(Delivered(envelope, summary), now_ns)
+
+
+def run_lockstep(
+    rig: Rig,
+    rig_text: str,
+    rig_path: Path,
+    recording: Path,
+    duration_s: float,
+    seed: int | None,
+    progress: Progress,
+) -> None:
+    """Run a rig for ``duration_s`` of virtual time into a recording.
+
+    Raises:
+        UsageError: The rig cannot run in lockstep, or the recording cannot be written.
+    """
+    seed = seed_of(rig, seed)
+    info = recording_info(rig, rig_text, rig_path, seed, utc_offset_ns=None)
+    try:
+        recorder = Recorder(recording, info)
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
+    try:
+        runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(tuple(rig.vehicles), recorder)])
+    except BaseException:
+        recorder.discard()
+        raise
+    with recorder:
+        try:
+            runner.run(
+                round(duration_s * 1e9),
+                lambda now_ns: progress(f"{now_ns * 1e-9:.1f} s of {duration_s:g} s", now_ns * 1e-9),
+            )
+        finally:
+            runner.close()

@@ -1,0 +1,78 @@
+"""A lockstep run of a rig, made by one call: for examples, tests, scenarios, campaigns."""
+
+from collections.abc import Iterable
+
+from pydantic import ValidationError
+
+from drivers.errors import NotFound
+from drivers.laboratory import load_laboratory
+from groundstation.bus.journal import JournalWriter, NoJournal
+from groundstation.declarations.errors import RigError
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Request
+from groundstation.declarations.rig import Rig
+from groundstation.rig.plan import config_crc, laboratory_ports
+from groundstation.runners.lockstep import PROCESS, LockstepRunner, Observer
+from groundstation.runners.requests import RequestPlayer
+from groundstation.runners.slot import Sequences, Slot
+from groundstation.runners.step import build_slots
+
+DEFAULT_SEED = 1
+
+
+def make_runner(
+    rig: Rig,
+    seed: int | None = None,
+    observers: Iterable[Observer] = (),
+    *,
+    extra_nodes: Iterable[Node] = (),
+    requests: Iterable[Request] = (),
+    journaled: bool = True,
+) -> LockstepRunner:
+    """Build everything that a rig names, on one thread and in virtual time.
+
+    Args:
+        rig: The rig.
+        seed: Of the laboratory; None takes the rig's, else ``DEFAULT_SEED``.
+        observers: Called for each published message.
+        extra_nodes: Nodes beside those of the rig, the last to receive.
+        requests: What is asked of vehicles, each at its stamp.
+        journaled: Whether the run can be replayed and its causes named.
+
+    Raises:
+        RigError: The rig has no laboratory, its laboratory refuses its table, or a node its configuration.
+    """
+    if rig.laboratory is None:
+        raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
+    journal, sequences = JournalWriter() if journaled else NoJournal(), Sequences()
+    try:
+        laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed_of(rig, seed))
+        slots = build_slots(rig, None, journal, sequences, name=PROCESS, measure=False)
+    except ValidationError as error:
+        raise RigError(_sentence(error)) from error
+    except (NotFound, ValueError) as error:  # a file of the laboratory, or of our calibration
+        raise RigError(str(error)) from error
+    extra = list(extra_nodes)
+    asked = list(requests)
+    if asked:
+        extra.append(RequestPlayer(asked))
+    crc = config_crc(rig)
+    for number, node in enumerate(extra):
+        key = f"extra/{type(node).__name__}_{number}"
+        slots.append(Slot(key, node, PROCESS, crc, journal, sequences, measure=False))
+    ports = laboratory_ports(rig, laboratory.channels())
+    return LockstepRunner(slots, laboratory, ports, observers, journal, sequences)
+
+
+def seed_of(rig: Rig, seed: int | None) -> int:
+    """The seed asked for, else the rig's, else ``DEFAULT_SEED``."""
+    if seed is not None:
+        return seed
+    table = rig.laboratory.table if rig.laboratory is not None else {}
+    return int(table.get("seed", DEFAULT_SEED))
+
+
+def _sentence(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in ("laboratory", *first["loc"]))
+    return f"{key}: {first['msg'].removeprefix('Value error, ')}"

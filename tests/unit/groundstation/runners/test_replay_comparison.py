@@ -1,0 +1,78 @@
+"""Tolerances are data; angles are compared across their seam."""
+
+import math
+
+import pytest
+
+from groundstation.declarations.errors import UsageError
+from groundstation.parts.control.messages import ControlStatus
+from groundstation.runners.replay_comparison import difference, load_tolerances
+
+TOPIC = ControlStatus.TOPIC
+
+
+def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
+    return ControlStatus(5, "alpha", "station", position, heading_rad, error_m, 0.0)
+
+
+def compare(then, now, **allowed):
+    return difference(TOPIC, 3, TOPIC.codec.encode(then), now, {"control_status": allowed})
+
+
+def test_equal_bits_need_no_tolerance():
+    assert compare(status(math.nan), status(math.nan)) == (True, None)
+
+
+def test_an_angle_that_crossed_the_seam_is_close():
+    then, now = status(math.pi - 1e-10), status(-math.pi + 1e-10)
+    assert compare(then, now, goal_heading_rad=1e-9) == (False, None)
+    assert compare(then, now)[1].field == "goal_heading_rad"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1.1])
+def test_what_is_not_a_number_is_never_close_to_one(value):
+    assert compare(status(error_m=1.0), status(error_m=value), error_position_m=0.01)[1] is not None
+    assert compare(status(error_m=value), status(error_m=1.0), error_position_m=0.01)[1] is not None
+
+
+def test_infinity_is_close_to_itself():
+    then, now = status(error_m=math.inf, position=(1.0, 2.0)), status(error_m=math.inf, position=(1.0, 2.1))
+    assert compare(then, now, error_position_m=0.1, goal_position_table_m=0.2) == (False, None)
+
+
+def test_texts_and_integers_have_no_tolerance():
+    then, now = status(), ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0)
+    found = compare(then, now)[1]
+    assert (found.field, found.recorded, found.replayed) == ("controller", "'station'", "'brake'")
+    assert "sequence 3" in str(found)
+
+
+def test_tolerances_are_read_from_toml(tmp_path):
+    path = tmp_path / "t.toml"
+    path.write_text("[wrench]\nforce_x_n = 1e-9\n[fix_account]\nnis = 1\n")
+    assert load_tolerances(path) == {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[sate]\n", "'sate' is no topic"),
+        ("state = 1\n", "expected a table"),
+        ("[wrench]\nforce_x_kn = 1\n", "no field of floating-point"),
+        ("[control_status]\ncontroller = 1\n", "no field of floating-point"),
+        ("[wrench]\nforce_x_n = -1\n", "from 0 up"),
+        ("[wrench]\nforce_x_n = nan\n", "from 0 up"),
+        ("[wrench]\nforce_x_n = true\n", "from 0 up"),
+        ("[state\n", "cannot be read"),
+    ],
+)
+def test_wrong_tolerances_are_refused_in_one_sentence(tmp_path, text, sentence):
+    path = tmp_path / "t.toml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=sentence):
+        load_tolerances(path)
+
+
+def test_tolerances_that_are_not_there_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="cannot be read"):
+        load_tolerances(tmp_path / "nothing.toml")

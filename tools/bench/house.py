@@ -1,0 +1,297 @@
+"""What the processes of a live run cost: seconds until all are ready, CPU and memory by group.
+
+    .venv/bin/python tools/bench/house.py
+    .venv/bin/python tools/bench/house.py --seconds 20 --runs 3 --before ../commit_before
+
+Flies the rig of ``make run`` headless and recorded, with the interpreter of the checkout that is measured
+(``.venv`` in it). With --before, runs of both checkouts alternate, so that a machine that grows busy treats
+them alike, and the ratio after to before of the medians is printed. The emulated laboratory stands for
+hardware and is counted apart. Linux only: the figures come from ``/proc``.
+
+CPU is that of the window of --seconds that begins --settle seconds after all processes were ready, when the
+vehicles fly; memory (PSS: shared pages count in parts) is read at the end of the window.
+"""
+
+import argparse
+import os
+import queue
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+RIG = Path("examples/rigs/two_mock_ups.toml")
+READY = "all processes are ready"
+READY_WITHIN_S, ENDED_WITHIN_S = 60.0, 20.0
+STATION, EMULATOR = "station, all", "emulator"
+LAUNCHER, FORK_SERVER = "launcher", "fork server"
+GROUPS = (LAUNCHER, FORK_SERVER, "recorder", "commands", "flights", "skies", "station", "others")
+_TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+class HouseError(Exception):
+    """A run did not become ready, lost a process or did not end well; the text says what it printed last."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """One run of one checkout.
+
+    Attributes:
+        ready_s: From the start of the command until it printed that all processes are ready.
+        cpu_cores: CPU seconds a second, by group.
+        pss_mb: Proportional set size in MB, by group.
+        total_cpu_s: CPU seconds that the station's processes had used when all were ready.
+    """
+
+    ready_s: float
+    cpu_cores: dict[str, float]
+    pss_mb: dict[str, float]
+    total_cpu_s: float
+
+
+def run_once(checkout: Path, rig: Path, seconds: float, settle_s: float) -> Cost:
+    """Fly once and measure.
+
+    Args:
+        checkout: Where ``.venv`` and the rig are.
+        rig: Rig file, relative to the checkout.
+        seconds: Length of the window.
+        settle_s: From ready to the beginning of the window.
+
+    Raises:
+        HouseError: The run was none to measure.
+    """
+    with tempfile.TemporaryDirectory(prefix="house_") as folder:
+        command = [str(checkout / ".venv" / "bin" / "groundstation"), "run", str(checkout / rig)]
+        command += ["--headless", "--record", f"{folder}/run.mcap"]
+        begin_s = time.monotonic()
+        process = subprocess.Popen(
+            command,
+            cwd=checkout,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=_environment(checkout),
+        )
+        lines = _Lines(process)
+        try:
+            ready_s = lines.wait_for(READY, READY_WITHIN_S) - begin_s
+            first = _groups(process.pid)
+            total_cpu_s = sum(_cpu_s(first[name]) for name in GROUPS if name in first)
+            time.sleep(settle_s)  # the vehicles rest, then fly: the window looks at flying ones
+            groups = _groups(process.pid)
+            from_s, cpu_from_s = time.monotonic(), {name: _cpu_s(pids) for name, pids in groups.items()}
+            time.sleep(seconds)
+            cpu_s = {name: _cpu_s(pids) - cpu_from_s[name] for name, pids in groups.items()}
+            took_s = time.monotonic() - from_s
+            pss_mb = {name: sum(map(_pss_mb, pids)) for name, pids in groups.items()}
+            if _groups(process.pid) != groups:
+                raise HouseError(f"{checkout}: a process died or was restarted\n{lines.newest()}")
+        finally:
+            process.terminate()
+            try:
+                code = process.wait(ENDED_WITHIN_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                code = process.wait()
+            lines.close()
+    if code:
+        raise HouseError(f"{checkout}: the run ended with code {code}\n{lines.newest()}")
+    return Cost(ready_s, {name: used / took_s for name, used in cpu_s.items()}, pss_mb, total_cpu_s)
+
+
+def _environment(checkout: Path) -> dict[str, str]:
+    """Ours, without what would make one checkout import another."""
+    dropped = {"PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME"}
+    kept = {name: value for name, value in os.environ.items() if name not in dropped}
+    # an editable install leads back to the folder that it was made in, which need not be this one
+    return kept | {"PYTHONPATH": str(checkout)}
+
+
+class _Lines:
+    """What a process prints, read by a thread so that its pipe never fills."""
+
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        self._process = process
+        self._all: list[str] = []
+        self._news: queue.SimpleQueue[tuple[float, str] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self._all.append(line.rstrip())
+            self._news.put((time.monotonic(), line))
+        self._news.put(None)
+
+    def wait_for(self, text: str, within_s: float) -> float:
+        """Moment at which a line with the text came, on the monotonic clock."""
+        until_s = time.monotonic() + within_s
+        while (left_s := until_s - time.monotonic()) > 0:
+            try:
+                news = self._news.get(timeout=left_s)
+            except queue.Empty:
+                break
+            if news is None:
+                raise HouseError(f"the run ended by itself\n{self.newest()}")
+            if text in news[1]:
+                return news[0]
+        raise HouseError(f"no line '{text}' within {within_s:g} s\n{self.newest()}")
+
+    def newest(self) -> str:
+        """The last lines, for people."""
+        return "\n".join(f"  {line}" for line in self._all[-12:])
+
+    def close(self) -> None:
+        """Let the thread end."""
+        self._thread.join(2.0)
+        if self._process.stdout is not None and not self._thread.is_alive():
+            self._process.stdout.close()
+
+
+def _groups(launcher: int) -> dict[str, tuple[int, ...]]:
+    """Process numbers by group; a child of the emulator is the emulator's."""
+    found: dict[str, list[int]] = {LAUNCHER: [launcher]}
+
+    def visit(pid: int, group: str | None) -> None:
+        for child in _children(pid):
+            named = group or _group_of(child)
+            found.setdefault(named, []).append(child)
+            visit(child, EMULATOR if named == EMULATOR else None)
+
+    visit(launcher, None)
+    return {name: tuple(sorted(pids)) for name, pids in sorted(found.items())}
+
+
+def _group_of(pid: int) -> str:
+    """By the name that a process gave itself, or the last word of its command line."""
+    words = _read(pid, "cmdline").split("\0")
+    if "firmware_emulator" in words:
+        return EMULATOR
+    for name in (_read(pid, "comm").strip(), *reversed([word for word in words if word])):
+        if name.endswith("_flight"):
+            return "flights"
+        if name.endswith("_sky"):
+            return "skies"
+        if name in GROUPS:
+            return name
+        if "fork" in name:
+            return FORK_SERVER
+    return "others"
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        tasks = list(Path(f"/proc/{pid}/task").iterdir())
+    except OSError:
+        return []
+    return [int(child) for task in tasks for child in _read(pid, f"task/{task.name}/children").split()]
+
+
+def _read(pid: int, name: str) -> str:
+    """A file of ``/proc/<pid>``; empty if the process is gone."""
+    try:
+        return Path(f"/proc/{pid}/{name}").read_text(errors="replace")
+    except OSError:
+        return ""
+
+
+def _cpu_s(pids: Iterable[int]) -> float:
+    """User and system time of the processes themselves."""
+    total = 0
+    for pid in pids:
+        fields = _read(pid, "stat").rpartition(")")[2].split()
+        total += sum(map(int, fields[11:13]))  # utime, stime
+    return total * _TICK_S
+
+
+def _pss_mb(pid: int) -> float:
+    for line in _read(pid, "smaps_rollup").splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) / 1024
+    return 0.0
+
+
+def _medians(costs: list[Cost]) -> dict[str, float]:
+    """Figures of a checkout, over its runs."""
+    figures = {
+        "ready, s": statistics.median(cost.ready_s for cost in costs),
+        "CPU until ready, s": statistics.median(cost.total_cpu_s for cost in costs),
+    }
+    for title, by_group in (
+        ("CPU, cores", [cost.cpu_cores for cost in costs]),
+        ("PSS, MB", [cost.pss_mb for cost in costs]),
+    ):
+        for name in GROUPS:
+            if any(name in row for row in by_group):
+                figures[f"{title}: {name}"] = statistics.median(row.get(name, 0.0) for row in by_group)
+        of_station = [sum(row.get(name, 0.0) for name in GROUPS) for row in by_group]
+        figures[f"{title}: {STATION}"] = statistics.median(of_station)
+        figures[f"{title}: {EMULATOR}"] = statistics.median(row.get(EMULATOR, 0.0) for row in by_group)
+    return figures
+
+
+def _table(after: dict[str, float], before: dict[str, float]) -> str:
+    """The figures of one or both checkouts, with their ratio."""
+    lines = [f"{'':34}{'before':>10}{'now':>10}{'ratio':>8}" if before else f"{'':34}{'now':>10}"]
+    for name in after | before:
+        cells = [name.ljust(34)]
+        if before:
+            cells.append(_cell(before.get(name)))
+        cells.append(_cell(after.get(name)))
+        if before.get(name) and name in after:
+            cells.append(f"{after[name] / before[name]:8.2f}")
+        lines.append("".join(cells))
+    return "\n".join(lines)
+
+
+def _cell(value: float | None) -> str:
+    return f"{value:10.3f}" if value is not None else f"{'-':>10}"
+
+
+def main() -> None:
+    """Parse the words, fly, print."""
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--checkout", type=Path, default=ROOT, help="what is measured (default: this one)")
+    words.add_argument(
+        "--before", type=Path, help="another checkout to compare with, with a .venv of its own"
+    )
+    words.add_argument("--rig", type=Path, default=RIG, help="rig file, relative to the checkouts")
+    words.add_argument("--seconds", type=float, default=20.0, help="length of the window")
+    words.add_argument("--settle", type=float, default=12.0, help="seconds from ready to the window")
+    words.add_argument("--runs", type=int, default=1, help="runs of each checkout; medians are printed")
+    arguments = words.parse_args()
+    checkouts = {"now": arguments.checkout.absolute()}
+    if arguments.before is not None:
+        checkouts = {"before": arguments.before.absolute(), **checkouts}
+    for checkout in checkouts.values():
+        if not (checkout / ".venv" / "bin" / "groundstation").exists():
+            words.error(f"{checkout} has no .venv/bin/groundstation: run `make` there first")
+    costs: dict[str, list[Cost]] = {name: [] for name in checkouts}
+    for number in range(arguments.runs):
+        for name, checkout in checkouts.items():
+            try:
+                cost = run_once(checkout, arguments.rig, arguments.seconds, arguments.settle)
+            except HouseError as error:
+                sys.exit(f"house: {error}")
+            costs[name].append(cost)
+            print(
+                f"run {number + 1}, {name}: ready in {cost.ready_s:.2f} s, "
+                f"{sum(cost.cpu_cores.get(group, 0.0) for group in GROUPS):.2f} cores, "
+                f"{sum(cost.pss_mb.get(group, 0.0) for group in GROUPS):.0f} MB",
+                flush=True,
+            )
+    before = _medians(costs["before"]) if "before" in costs else {}
+    print(_table(_medians(costs["now"]), before))
+
+
+if __name__ == "__main__":
+    main()
