@@ -1,4 +1,4 @@
-"""Contracts over nodes and ports of every example: who publishes, who receives, and that truth is observed only."""
+"""Contracts over the nodes and ports of every example: who publishes, who receives, who sees truth."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Contracts over the parts: what they declare fits together, and their sections refuse what they do not know."""
+"""Contracts over the parts: what they declare fits together, sections and actions refuse what is unknown."""
 
 import json
 import math
@@ -82,7 +82,7 @@ def test_a_parts_nodes_ports_and_actions_name_nodes_that_exist(part):
 
 @parts
 def test_what_a_part_declares_is_its_own(part):
-    """A node of a part publishes topics of its part, or shared ones; what it declares somebody has a use for."""
+    """A node publishes topics of its part or shared ones; every topic that a part declares is published."""
     makers = {kind for row in part.nodes for kind in row.node_class().outputs} | {
         port.kind.reads for port in part.ports
     }

@@ -105,7 +105,7 @@ def test_a_standard_type_under_another_definition_is_refused():
 )
 def test_a_garbled_schema_is_refused_as_such(line):
     schema = schema_text(StarFix).replace("bool fix\n", f"bool fix\n{line}\n")
-    with pytest.raises(RecordingError, match="^x has a schema that cannot be read"):
+    with pytest.raises(RecordingError, match=r"^x has a schema that cannot be read"):
         decoder_of(StarFix, schema, "x")
 
 
