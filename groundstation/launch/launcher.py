@@ -23,7 +23,7 @@ from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.rig import Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
-from groundstation.launch.fork_server import ForkServer
+from groundstation.launch.fork_server import ForkServer, share_one_arena
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
@@ -83,6 +83,7 @@ class Launcher:
     def start(self) -> None:
         """Start everything; processes go once the laboratory has announced its ports."""
         self._began_s = time.monotonic()
+        share_one_arena()
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
