@@ -7,7 +7,7 @@ from pathlib import Path
 
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Provenance
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.json_file import json_text
 from groundstation.files.png import png_of
 from groundstation.files.writing import Content, write_files

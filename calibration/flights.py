@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.cli.errors import UsageError
 from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.fusion.estimator import Estimator
 from groundstation.fusion.flight_data import FlightData
@@ -60,7 +60,9 @@ def read_flight(
     if source.is_dir():
         return read_folder(source, with_stars=with_stars).tidied()
     with opened(source, rig_path) as (recording, rig):
-        names = [name for name in rig.vehicles if not rates_only or rig.vehicle(name, StarsOfVehicle).star_camera]
+        names = [
+            name for name in rig.vehicles if not rates_only or rig.vehicle(name, StarsOfVehicle).star_camera
+        ]
         chosen = _one_of(source, names, vehicle, "star cameras fly on" if rates_only else "there are")
         return _of_recording(source, recording, rig, chosen, rates_only=rates_only).tidied()
 

@@ -1,20 +1,20 @@
 """Guided calibrations of a running vehicle; entry points of the group ``groundstation.wizards``.
 
 A wizard needs no terminal: it takes messages, gives advice and names the requests that a person would make.
-Here it is led on a terminal; a console can lead the same wizard.
+Here it is led on a terminal, as a node of its own in a live runner beside the run; a console can lead the
+same wizard, and a lockstep runner takes the same node.
 """
 
 from __future__ import annotations
 
 import getpass
 import hashlib
-import math
-import queue
-from collections.abc import Iterator, Mapping
+import itertools
+import json
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import entry_points
 from pathlib import Path
-from time import monotonic, monotonic_ns
 from typing import Protocol
 
 import zenoh
@@ -23,30 +23,28 @@ from calibration.delivery import deliver
 from calibration.imu.guided import Advice
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Provenance
-from groundstation.bus.cdr import CodecError
-from groundstation.bus.zenoh_bus import ZenohBus
-from groundstation.cli.errors import UsageError
-from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, Request, Value
 from groundstation.declarations.rig import Rig
-from groundstation.declarations.topic import Topic
-from groundstation.launch.asking import ask
+from groundstation.launch.beside import run_beside
 from groundstation.launch.running import find_running
 from groundstation.rig.read import load_rig
 
 GROUP = "groundstation.wizards"
-ADVICE_EVERY_S = 1.0
-SILENCE_S = 10.0
+ADVICE_PERIOD_NS = 1_000_000_000
+SILENCE_NS = 10_000_000_000
 
-Request = tuple[str, tuple[float, ...]]
-"""Action and numbers."""
+Wish = tuple[str, Mapping[str, Value]]
+"""An action, and its arguments by name."""
 
 
 class Guide(Protocol):
     """One calibration that is going on."""
 
-    topics: Mapping[str, Topic]
-    """What it takes, by noun."""
+    kinds: tuple[type[Message], ...]
+    """Classes of the messages that it takes."""
 
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle."""
@@ -54,7 +52,7 @@ class Guide(Protocol):
     def advice(self, now_s: float) -> Advice:
         """Return what to do now; its step is None when there is enough data."""
 
-    def requests(self, now_s: float) -> Iterator[Request]:
+    def requests(self, now_s: float) -> Iterator[Wish]:
         """Yield what the vehicle has to be asked for, if it is to be driven."""
 
     def outcome(self) -> Outcome:
@@ -90,6 +88,61 @@ def load_wizard(name: str) -> Wizard:
     return wizard
 
 
+class GuideNode(Node):
+    """Leads a guide as a node among others: what it is told is journaled, what it asks for is recorded.
+
+    Args:
+        vehicle: Which one.
+        guide: The calibration.
+        advise: Takes each piece of advice.
+        author: In whose name requests are made; empty where the operator makes them.
+
+    Attributes:
+        is_done: There is enough data, or nothing has arrived for long.
+        trouble: Why it ended without enough data; empty otherwise.
+    """
+
+    outputs = (Request,)
+
+    def __init__(self, vehicle: str, guide: Guide, advise: Callable[[Advice], None], author: str) -> None:
+        super().__init__(vehicle, ADVICE_PERIOD_NS)
+        self.inputs = (*guide.kinds, Ack)
+        self._guide = guide
+        self._advise = advise
+        self._author = author
+        self._numbers = itertools.count(1)
+        self._received_ns: int | None = None
+        self.is_done = False
+        self.trouble = ""
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        if isinstance(message, Ack):
+            if message.author == self._author and not message.accepted and message.action == "go_to":
+                print(f"  {message.action} was refused: {message.reason}")
+        else:
+            self._received_ns = now_ns
+            self._guide.take(message, now_ns)
+        yield from ()
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        if self.is_done:
+            return
+        if self._received_ns is None:
+            self._received_ns = now_ns
+        if now_ns - self._received_ns > SILENCE_NS:
+            self.is_done, self.trouble = True, "nothing was received from the vehicle for 10 s."
+            return
+        advice = self._guide.advice(now_ns * 1e-9)
+        self._advise(advice)
+        if advice.step is None:
+            self.is_done = True
+        elif self._author:
+            for action, arguments in self._guide.requests(now_ns * 1e-9):
+                number = next(self._numbers)
+                text = json.dumps(dict(arguments))
+                yield Request(now_ns, self.vehicle, number, self._author, action, text)
+
+
 def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven: bool) -> None:
     """Lead an operator through a guided calibration of a run that is going on, and write its result.
 
@@ -114,13 +167,13 @@ def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven
             f"no run with a vehicle {chosen!r} is going on: start it with `groundstation run {rig_path}`."
         )
     guide = wizard.begin(rig, chosen)
-    inbox = _Inbox(guide)
+    node = GuideNode(chosen, guide, _print_advice, getpass.getuser() if is_driven else "")
     try:
-        with ZenohBus(run.endpoint) as bus:
-            bus.subscribe(f"{chosen}/*", inbox.put)
-            _lead(guide, inbox, run.endpoint if is_driven else None, chosen)
+        run_beside(rig, run.endpoint, "guided_calibration", node, lambda: node.is_done)
     except zenoh.ZError as error:
         raise GroundStationError(f"the run at {run.endpoint} does not let us in: {error}") from error
+    if node.trouble:
+        raise GroundStationError(node.trouble)
     try:
         found = guide.outcome()
     except CalibrationRefusedError as error:
@@ -129,61 +182,10 @@ def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven
     deliver(found, Provenance(f"live, rig {rig_path.name}", digest, datetime.now(UTC)), out)
 
 
-class _Inbox:
-    """Messages from Zenoh's thread to this one."""
-
-    def __init__(self, guide: Guide) -> None:
-        self._guide = guide
-        self._waiting: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
-
-    def put(self, key: str, data: bytes, _attachment: bytes) -> None:
-        """Take a sample on Zenoh's thread."""
-        noun = key.partition("/")[2]
-        if noun in self._guide.topics:
-            self._waiting.put((noun, data))
-
-    def deliver(self, timeout_s: float) -> bool:
-        """Give what has arrived to the guide; False after silence."""
-        try:
-            noun, data = self._waiting.get(timeout=timeout_s)
-        except queue.Empty:
-            return False
-        while True:
-            try:
-                message = self._guide.topics[noun].codec.decode(data)
-            except CodecError:
-                message = None  # of another version of this program: as if it had not arrived
-            if message is not None:
-                self._guide.take(message, monotonic_ns())
-            try:
-                noun, data = self._waiting.get_nowait()
-            except queue.Empty:
-                return True
-
-
-def _lead(guide: Guide, inbox: _Inbox, endpoint: str | None, vehicle: str) -> None:
-    """Print instructions until there is enough data; make the requests if there is an endpoint for them."""
-    advised_s, received_s = -math.inf, monotonic()
-    while True:
-        now_s = monotonic()
-        if inbox.deliver(0.2):
-            received_s = now_s
-        elif now_s - received_s > SILENCE_S:
-            raise GroundStationError(f"nothing was received from the vehicle for {SILENCE_S:g} s.")
-        if now_s - advised_s < ADVICE_EVERY_S:
-            continue
-        advised_s = now_s
-        advice = guide.advice(now_s)
-        if advice.step is None:
-            print("Enough data.", flush=True)
-            return
-        if advice.is_new:
-            print(f"{advice.step.name}: {advice.step.instruction}", flush=True)
-        else:
-            print(f"  {100 * advice.done:3.0f} %   {advice.missing}", flush=True)
-        if endpoint is None:
-            continue
-        for action, numbers in guide.requests(now_s):
-            ack = ask(endpoint, vehicle, action, numbers, getpass.getuser(), 3.0)
-            if not ack.accepted and action == "go_to":
-                print(f"  {action} was refused: {ack.reason}")
+def _print_advice(advice: Advice) -> None:
+    if advice.step is None:
+        print("Enough data.", flush=True)
+    elif advice.is_new:
+        print(f"{advice.step.name}: {advice.step.instruction}", flush=True)
+    else:
+        print(f"  {100 * advice.done:3.0f} %   {advice.missing}", flush=True)

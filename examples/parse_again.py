@@ -13,7 +13,6 @@ import numpy as np
 
 from drivers.imu_block.protocol import FrameParser, ImuFrame
 from drivers.imu_block.sensors import rate_rad_s, specific_force_m_s2
-from groundstation.bus.topics import topic_of
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.recording.reader import Recording
 
@@ -30,7 +29,7 @@ def main() -> None:
     frames = FrameParser()  # finds out by itself which version the block speaks
     samples: list[tuple[float, float, float]] = []
     with Recording(arguments.recording) as recording:
-        for message in recording.messages([ImuBytes.TOPIC], [arguments.vehicle]):
+        for message in recording.messages([ImuBytes], [arguments.vehicle]):
             assert isinstance(message.payload, ImuBytes)
             for frame in frames.feed(message.payload.data):
                 if isinstance(frame, ImuFrame):

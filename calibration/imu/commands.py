@@ -16,7 +16,7 @@ from calibration.imu import tilt as tilt_procedure
 from calibration.result import provenance_of, provenance_of_several
 from calibration.table.procedure import map_of_sources
 from calibration.table.smoothed_flights import read_source
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.fusion.table_map import TableMap
 

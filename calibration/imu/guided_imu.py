@@ -13,8 +13,8 @@ from calibration.imu.guided import Advice, GuidedSequence
 from calibration.imu.joint import constants, widened
 from calibration.outcome import Outcome
 from calibration.result import quantity_lines
-from calibration.wizard import Request, lead
-from groundstation.cli.errors import UsageError
+from calibration.wizard import Wish, lead
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.fusion import error_state as es
@@ -43,7 +43,7 @@ class GuidedImu:
         vehicle: Which one.
     """
 
-    topics: ClassVar = {kind.TOPIC.noun: kind.TOPIC for kind in (Imu, StarFix, OverheadFix, ValveStatus)}
+    kinds: ClassVar = (Imu, StarFix, OverheadFix, ValveStatus)
 
     def __init__(self, rig: Rig, vehicle: str) -> None:
         self._vehicle = vehicle
@@ -86,7 +86,7 @@ class GuidedImu:
         self._advice = self._sequence.update(now_s, self._known())
         return self._advice
 
-    def requests(self, now_s: float) -> Iterator[Request]:
+    def requests(self, now_s: float) -> Iterator[Wish]:
         """Yield what the step of the last advice wants the vehicle to do, now and then."""
         step = None if self._advice is None else self._advice.step
         if step is None:
@@ -96,7 +96,7 @@ class GuidedImu:
             for action in (
                 ("disarm", "float_off") if step.is_rest else ("float_on", "release", "arm", "resume")
             ):
-                yield action, ()
+                yield action, {}
             self._next_s = now_s + SETTLE_S
         if step.is_rest or now_s < self._next_s:
             return
@@ -110,7 +110,7 @@ class GuidedImu:
             dx, dy, turn = ROUND_TRIP[self._sent % len(ROUND_TRIP)]
             x, y, heading = x + dx, y + dy, heading + turn
         self._sent += 1
-        yield "go_to", (x, y, math.remainder(heading, math.tau))
+        yield "go_to", {"x_m": x, "y_m": y, "heading_rad": math.remainder(heading, math.tau)}
 
     def outcome(self) -> Outcome:
         """Return every constant with its sigma.

@@ -17,7 +17,7 @@ from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import NotARest, zero_offset
 from calibration.outcome import Outcome
 from calibration.result import Quantity
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.tables import load_table
 from groundstation.fusion.flight_data import Array, FlightData
 from groundstation.fusion.noise import NoiseModel

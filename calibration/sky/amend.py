@@ -8,7 +8,7 @@ from pathlib import Path
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.sky.amendment import Amendment, NewPlace, propose
 from calibration.sky.star_list import COLUMNS, star_list_text, star_row
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.reading import read_bytes, text_of
 from groundstation.files.tables import Table, parse_table
 from groundstation.parts.operation.messages import CalibrationInUse

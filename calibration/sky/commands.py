@@ -18,9 +18,9 @@ from calibration.sky.pictures import find_spots, printed_board, read_sky_picture
 from calibration.sky.survey.anchors import read_anchors
 from calibration.sky.survey.sweep import survey_sweep
 from calibration.sky.turns import read_turns
-from groundstation.cli.errors import UsageError
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.star_folder import find_frames
+from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.star_tracking.camera_model import CameraCalibration
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.sky.board import Board
-from groundstation.cli.errors import UsageError
 from groundstation.cli.progress import with_progress
 from groundstation.data_sets.star_folder import find_frames, load_sky, read_frame
+from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect

@@ -14,7 +14,7 @@ from calibration.delivery import refusing
 from calibration.table.figures import draw_map
 from calibration.table.procedure import SHORTEST_WAVE_M, check_on, map_of_sources, summary_of
 from calibration.table.smoothed_flights import Bounds, read_source
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.png import png_of
 from groundstation.files.writing import check_targets, write_files
 from groundstation.fusion.levelling import levelling

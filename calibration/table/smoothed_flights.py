@@ -14,8 +14,8 @@ from scipy.ndimage import uniform_filter1d
 from calibration.flights import fuse, opened
 from calibration.outcome import CalibrationRefusedError
 from calibration.table.flight_log import FlightLog
-from groundstation.cli.errors import UsageError
 from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.declarations.errors import UsageError
 from groundstation.fusion.estimator import Fix, FixAccount, ImuPacket, PlanarState
 from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.noise import NoiseModel

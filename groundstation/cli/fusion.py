@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, FixAccount, PlanarState

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.request import ArgumentError
 from groundstation.launch.asking import ask
 from groundstation.launch.running import choose_run

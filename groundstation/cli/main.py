@@ -137,6 +137,7 @@ def call(words: list[str]) -> int:
     from drivers.errors import DeviceError
     from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import FileError
+    from groundstation.core.library import CoreError
     from groundstation.recording.errors import RecordingError
 
     words = spelled(words)
@@ -147,7 +148,7 @@ def call(words: list[str]) -> int:
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 2
-    except GroundStationError as error:
+    except (GroundStationError, CoreError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 1
     return 0

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.files.png import write_png
 from groundstation.files.writing import whole_folder
 from groundstation.parts.stars.messages import StarMatches, StarPicture

@@ -7,8 +7,8 @@ import pytest
 
 from groundstation.parts.fusion.messages import FusionStatus
 from groundstation.parts.reference.messages import ReferenceState
-from groundstation.runners.make_runner import make_runner
 from groundstation.rig.read import parse_rig
+from groundstation.runners.make_runner import make_runner
 
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "drawn_fixes.toml"
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.runners.make_runner import make_runner
 from groundstation.rig.read import parse_rig
+from groundstation.runners.make_runner import make_runner
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 

@@ -3,16 +3,15 @@
 from pathlib import Path
 
 import pytest
-
-from groundstation.bus.journal import JournalWriter
 from groundstation.bus.topics import TOPICS, topic_of
-from groundstation.declarations.topic import Recorded, Scope
-from groundstation.bus.journal import Journal
-from groundstation.parts.operation.messages import Diagnostics, Latency
-from groundstation.declarations.request import ACTIONS
 from groundstation.runtime.node_table import NODES, Weight, build_slots, key_of, make_node, process_of
-from groundstation.rig.plan import gives_way, processes_of
 from groundstation.runtime.ports import ports_of
+
+from groundstation.bus.journal import Journal, JournalWriter
+from groundstation.declarations.request import ACTIONS
+from groundstation.declarations.topic import Recorded, Scope
+from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.rig.plan import gives_way, processes_of
 from groundstation.rig.read import load_rig
 from groundstation.runners.slot import Sequences
 

@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
-
-from groundstation.recording.reader import Recording
-from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.rig.plan import make_node
 from groundstation.runtime.node_table import NODES
-from groundstation.runners.replay import ReplayRunner, recorded_nodes
+
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.recording.reader import Recording
+from groundstation.rig.plan import make_node
 from groundstation.rig.read import load_rig, parse_rig
+from groundstation.runners.replay import ReplayRunner, recorded_nodes
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 

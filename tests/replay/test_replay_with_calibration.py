@@ -7,14 +7,13 @@ import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
 from calibration.table.smoothed_flights import read_source
-from groundstation.bus.topics import topic_of
 from groundstation.fusion.table_map import MapProvenance, TableMap
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.messages import FusionCalibration
 from groundstation.recording.reader import Recording
-from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.rig.plan import make_node
-from groundstation.runners.replay import ReplayRunner
 from groundstation.rig.read import load_rig, parse_rig
+from groundstation.runners.replay import ReplayRunner
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)

@@ -9,13 +9,12 @@ import numpy as np
 
 from bench.journal_of import consumed, made_from
 from bench.rows import RIGS, ROOT, Bench, Row
-from groundstation.bus.topics import topic_of
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.parts.stars.messages import StarFix
-from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recorded, Recording
-from groundstation.declarations.rig import Rig
 from groundstation.rig.read import load_rig
 
 RIG = RIGS / "two_mock_ups.toml"
@@ -80,7 +79,7 @@ def _fly(bench: Bench, path: Path, duration_s: float) -> None:
 
 
 def _messages(recording: Recording, kind: type[Message], vehicle: str) -> Iterator[Recorded]:
-    return recording.messages([kind.TOPIC], [vehicle])
+    return recording.messages([kind], [vehicle])
 
 
 def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:

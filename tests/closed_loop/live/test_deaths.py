@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import _factory
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.operation.messages import SequencePhase
@@ -15,8 +14,8 @@ from groundstation.parts.stars.messages import StarFix
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
-from groundstation.runners.replay import ReplayRunner
 from groundstation.rig.read import parse_rig
+from groundstation.runners.replay import ReplayRunner
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.bus.topics import topic_of
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 from groundstation.recording.reader import Recording
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.runtime import factories
+from groundstation.runtime.ports import ports_of
 
 from calibration.result import provenance_of
 from calibration.sky.delay import delay_from_headings
 from groundstation.files.errors import FileError
-from groundstation.runtime import factories
-from groundstation.runtime.ports import ports_of
 from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 

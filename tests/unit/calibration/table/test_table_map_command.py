@@ -8,10 +8,10 @@ import tomllib
 import numpy as np
 import pytest
 
+from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 from groundstation.fusion.table_map import TableMap
 from groundstation.recording.errors import RecordingError
-from groundstation.declarations.errors import UsageError
 
 LEGS = ("--leg", "A:-1.5,-1", "--leg", "B:1.5,-1", "--leg", "C:0,1")
 KNOWN = {

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.cli.errors import UsageError
-from groundstation.recording.errors import RecordingError
-from groundstation.parts.fusion.estimation import rig_noise
+from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.fusion.estimation import rig_noise
+from groundstation.recording.errors import RecordingError
 from groundstation.rig.read import load_rig
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 
 @pytest.fixture

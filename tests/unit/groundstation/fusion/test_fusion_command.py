@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion import app
+from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 RIG = "examples/rigs/drawn_fixes.toml"
 

@@ -7,22 +7,20 @@ import numpy as np
 import pytest
 
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.journal import JournalWriter, Kind
-from groundstation.bus.topics import topic_of
-from groundstation.declarations.topic import Scope
-from groundstation.bus.journal import Journal
+from groundstation.bus.journal import Journal, JournalWriter, Kind
+from groundstation.declarations.errors import UsageError
+from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
+from groundstation.declarations.topic import Scope
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.stars.messages import StarImage
-from groundstation.declarations.node import Node
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.recording.writer import Recorder
-from groundstation.declarations.errors import UsageError
 from groundstation.runners.replay import ReplayRunner, recorded_nodes
 
 STEP_NS = 10_000_000

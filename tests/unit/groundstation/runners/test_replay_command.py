@@ -4,16 +4,15 @@ import re
 from pathlib import Path
 
 import pytest
+from groundstation.runners.lockstep_run import run_lockstep
 from typer.testing import CliRunner
 
-from groundstation.bus.topics import topic_of
 from groundstation.cli.replay import app as replay_app
 from groundstation.core.library import default_core
+from groundstation.declarations.errors import UsageError
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
-from groundstation.declarations.errors import UsageError
-from groundstation.runners.lockstep_run import run_lockstep
 from groundstation.rig.read import load_rig
 
 RIG = Path(__file__).parents[4] / "examples" / "rigs" / "drawn_fixes.toml"

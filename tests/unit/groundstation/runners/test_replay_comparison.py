@@ -4,9 +4,8 @@ import math
 
 import pytest
 
-from groundstation.bus.topics import topic_of
-from groundstation.parts.control.messages import ControlStatus
 from groundstation.declarations.errors import UsageError
+from groundstation.parts.control.messages import ControlStatus
 from groundstation.runners.replay_comparison import difference, load_tolerances
 
 TOPIC = ControlStatus.TOPIC

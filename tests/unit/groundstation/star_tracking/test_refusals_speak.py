@@ -52,9 +52,7 @@ class Sky:
         """All that is said of the next picture."""
         self.stamp_ns += PERIOD_NS
         height, width = image.shape
-        return self.tell(
-            StarImage(self.stamp_ns, "alpha", height, width, "mono8", 0, width, image.tobytes())
-        )
+        return self.tell(StarImage(self.stamp_ns, "alpha", height, width, "mono8", 0, width, image.tobytes()))
 
     def believe(self, pose, velocity=(0.0, 0.0), rate_rad_s=0.0):
         """The filter's state at the exposure that comes next."""

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.star_tracker import COLUMNS
+from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 
 POSES = ((2.0, 1.8, 0.5), (2.6, 2.1, -2.0))

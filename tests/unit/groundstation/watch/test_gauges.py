@@ -4,12 +4,6 @@ import math
 
 import pytest
 
-<<<<<<< HEAD
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.cli.vehicle_rows import LABELS, line_of, rows_of
-from groundstation.parts.stars.messages import SkyChange, StarFix
-=======
 from groundstation.declarations.request import Ack
 from groundstation.declarations.view import Level
 from groundstation.parts.control.messages import ControlStatus
@@ -19,7 +13,6 @@ from groundstation.parts.operation.messages import Diagnostics, SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars.messages import SkyChange, StarFix
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
->>>>>>> watch
 from groundstation.watch.monitor import Monitor
 
 SECOND_NS = 1_000_000_000
@@ -60,16 +53,6 @@ def watched(tables, message, delivered):
     return Watched(tables, message, delivered)
 
 
-<<<<<<< HEAD
-def tell(monitor, payload):
-    topic = payload.TOPIC
-    monitor.take(Delivered(Envelope(topic, "alpha", 1, payload.stamp_ns), payload), payload.stamp_ns)
-
-
-def fix(second, reason=""):
-    pose = (math.nan,) * 3 if reason else (1.0, 2.0, 0.5)
-    return StarFix(second * SECOND_NS, "alpha", not reason, *pose, (0.0,) * 9, 0.0, 9, "tracking", reason)
-=======
 def fix(watched, second, reason=""):
     watched.give(StarFix, second, fix=not reason, reason=reason)
 
@@ -91,7 +74,6 @@ def test_the_rows_stand_in_their_order(watched):
         "tank",
     )
     assert {cell.text for cell in watched.cells().values()} == {"-"}
->>>>>>> watch
 
 
 def test_the_present_reason_is_named_and_each_kind_is_counted(watched):
@@ -117,15 +99,9 @@ def test_with_a_fix_again_only_the_counts_remain(watched):
         ("appeared", "", "a light that is no star appeared at (1.000, 2.000) m, proposed"),
     ],
 )
-<<<<<<< HEAD
-def test_changes_of_the_sky_are_said_with_what_follows(monitor, change, star, words):
-    tell(monitor, SkyChange(SECOND_NS, "alpha", change, star, 1.0, 2.0, (1e-8, 0.0, 1e-8), 25))
-    (line,) = monitor.take_lines()
-=======
 def test_changes_of_the_sky_are_reported_with_what_follows(watched, change, star, words):
     watched.give(SkyChange, 1, change=change, star=star, x_m=1.0, y_m=2.0)
     (line,) = watched.monitor.take_lines()
->>>>>>> watch
     assert words in line
 
 

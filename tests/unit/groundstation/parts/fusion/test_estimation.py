@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.runtime.node_table import check_rig
 
 from calibration.result import CalibrationResult, Provenance, Quantity
+from groundstation.declarations.errors import RigError
 from groundstation.fusion import error_state as es
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.declarations.errors import RigError
 from groundstation.parts.fusion.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
-from groundstation.runtime.node_table import check_rig
 from groundstation.rig.provenance import calibration_hashes
 from groundstation.rig.read import parse_rig
 

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.runtime.node_table import NODES, check_rig, key_of, make_node
 
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
+from groundstation.declarations.errors import RigError
+from groundstation.parts.fusion.estimation import fused_floors_of
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
 from groundstation.parts.overhead.overhead_tracker import OverheadTracker
-from groundstation.declarations.errors import RigError
-from groundstation.parts.fusion.estimation import fused_floors_of
-from groundstation.runtime.node_table import NODES, check_rig, key_of, make_node
 from groundstation.rig.read import parse_rig
 
 ROOT = Path(__file__).parents[4]

@@ -1,22 +1,26 @@
-"""Detection in the compiled core and in NumPy: the same spots in every picture."""
+"""Detection and its oracle in NumPy: the same spots in every picture."""
 
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles.detection import OracleDetector
 
 from groundstation.core.build import compile_core
-from groundstation.core.library import PURE, load_core
+from groundstation.core.library import load_core
+from groundstation.star_tracking import detection
 from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError, detect
+
+pytestmark = pytest.mark.core
 
 ROUNDING_PX = 1e-7  # sums of another order, the exponential's last bits; both fits end after two steps
 
 
 @pytest.fixture(scope="module")
-def both(compiled_core):
+def both():
     """Both detectors, the same ones for all pictures: what one leaves behind must not show in the next."""
-    return Detector(core=compiled_core), Detector(core=PURE)
+    return Detector(), OracleDetector()
 
 
 def assert_equal_spots(both, image):
@@ -149,10 +153,10 @@ def test_spots_are_kept_when_the_next_picture_comes(both, painter):
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])
-def test_only_the_brightest_are_kept(compiled_core, painter, count):
+def test_only_the_brightest_are_kept(painter, count):
     image = painter.paint(np.random.default_rng(6), (2.5, 2.0, 0.4))
     chosen = DetectorSettings(max_spots=count)
-    few = assert_equal_spots((Detector(chosen, compiled_core), Detector(chosen, PURE)), image)
+    few = assert_equal_spots((Detector(chosen), OracleDetector(chosen)), image)
     assert len(few) == count
     everything = detect(image)
     far = np.hypot(few.u_px[:, None] - everything.u_px, few.v_px[:, None] - everything.v_px)
@@ -161,12 +165,12 @@ def test_only_the_brightest_are_kept(compiled_core, painter, count):
     assert (few.flux_dn >= 0.8 * everything.flux_dn[max(count - 1, 0)]).all()
 
 
-def test_a_picture_with_more_light_than_a_sky_is_flooded_in_both(compiled_core):
+def test_a_picture_with_more_light_than_a_sky_is_flooded_in_both():
     image = np.zeros((128, 128), np.uint8)
     image[8::16, 8::16] = 255  # 64 points, 5x5 pixels lit of each or fewer
     for ratio, flooded in ((0.12, False), (0.03, True)):
         chosen = DetectorSettings(max_lit_ratio=ratio)
-        spots = assert_equal_spots((Detector(chosen, compiled_core), Detector(chosen, PURE)), image)
+        spots = assert_equal_spots((Detector(chosen), OracleDetector(chosen)), image)
         assert spots.is_flooded is flooded
 
 
@@ -179,10 +183,9 @@ def test_a_picture_with_more_light_than_a_sky_is_flooded_in_both(compiled_core):
         np.zeros(64),
     ],
 )
-def test_both_refuse_what_is_no_picture(both, image):
-    for detector in both:
-        with pytest.raises(PictureError, match="expected"):
-            detector.find(image)
+def test_what_is_no_picture_is_refused(image):
+    with pytest.raises(PictureError, match="expected"):
+        detect(image)
 
 
 @pytest.mark.parametrize(
@@ -194,11 +197,14 @@ def test_limits_that_are_none_are_refused(wrong):
 
 
 @pytest.mark.slow
-def test_wider_vectors_give_the_same_bits(compiled_core, painter, tmp_path):
-    plain = load_core(compile_core(tmp_path / "plain.so", ("-DGS_NO_CLONES", "-Werror")))
+def test_wider_vectors_give_the_same_bits(painter, tmp_path, monkeypatch):
+    plain = load_core(compile_core(tmp_path, ("-DGS_NO_CLONES", "-Werror")))
+    wide = Detector()
+    monkeypatch.setattr(detection, "default_core", lambda: plain)
+    narrow = Detector()
     for velocity in ((0.0, 0.0, 0.0), (0.6, 0.2, 1.5)):
         image = painter.paint(np.random.default_rng(9), (2.5, 2.0, 0.4), velocity, exposure_s=0.04)
-        one, two = Detector(core=compiled_core).find(image), Detector(core=plain).find(image)
+        one, two = wide.find(image), narrow.find(image)
         assert len(one) > 10
         for name in ("u_px", "v_px", "flux_dn", "cov_px2", "elongation", "streak_px"):
             assert np.array_equal(getattr(one, name), getattr(two, name)), name

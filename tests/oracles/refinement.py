@@ -11,14 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.rays import CeilingPoints
+from groundstation.star_tracking.settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
-
-PRIOR_FREEDOM = 6.0  # a-priori sigmas count like this many residuals when the scale is judged
-CLIP_SIGMAS = 3.0  # of the robust scale; a few bad centres would otherwise rule the error
-REFINE_STEPS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,15 +34,6 @@ class Pose:
     cov: Array
     kept: NDArray[np.bool_]
     scale: float
-
-
-def spot_covariance(points: CeilingPoints, cov_px2: Array) -> Array:
-    """Carry pixel covariances (n, 3: uu, uv, vv) to the ceiling, shape (n, 2, 2), m^2."""
-    pixel = np.empty((len(cov_px2), 2, 2))
-    pixel[:, 0, 0], pixel[:, 1, 1] = cov_px2[:, 0], cov_px2[:, 2]
-    pixel[:, 0, 1] = pixel[:, 1, 0] = cov_px2[:, 1]
-    jacobian = points.jacobian_m_px
-    return np.asarray(jacobian @ pixel @ jacobian.transpose(0, 2, 1))
 
 
 def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shift_m: complex) -> Pose:

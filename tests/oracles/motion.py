@@ -16,16 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.fixes import BodyMotion
-from groundstation.star_tracking.robust import middle_value
+from groundstation.star_tracking.settings import (
+    MAX_MISFIT_RATIO,
+    MIN_STREAK_PX,
+    MIN_STREAK_SHARE,
+    MIN_STREAKS,
+    SMEAR_ROUNDS,
+)
+from oracles.robust import middle_value
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
-
-MIN_STREAK_PX = 3.0
-MIN_STREAKS = 4
-MIN_STREAK_SHARE = 0.4  # of all spots: a few oblong lights are no motion
-MAX_MISFIT_RATIO = 0.25
-SMEAR_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)

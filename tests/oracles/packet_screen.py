@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from groundstation.fusion.noise import NoiseModel
-
-NOISE_SIGMAS = 6.0
-"""Of the difference of two packets; one in a hundred million is beyond."""
+from groundstation.fusion.reckoner import largest_steps
 
 
 class PacketScreen:
@@ -22,9 +18,7 @@ class PacketScreen:
     def __init__(self, noise: NoiseModel) -> None:
         self._full_rate = noise.full_scale_rad_s
         self._full_acc = noise.full_scale_m_s2
-        per_packet = NOISE_SIGMAS * math.sqrt(2.0 / noise.packet_period_s)
-        self.max_acc_step = noise.max_acc_step_m_s2 + per_packet * noise.acc_density_m_s2_rthz
-        self.max_rate_step = noise.max_rate_step_rad_s + per_packet * noise.gyro_density_rad_s_rthz
+        self.max_rate_step, self.max_acc_step = largest_steps(noise)
         self._last: tuple[float, float, float] | None = None
         self._suspect: tuple[float, float, float] | None = None
 

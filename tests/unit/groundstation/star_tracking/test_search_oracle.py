@@ -1,29 +1,26 @@
-"""The compiled search against its NumPy twin: the same stars, the same verdict, the same pose."""
+"""The search against its oracle in NumPy: the same stars, the same verdict, the same pose."""
 
-import ctypes
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles.search import oracle_tracker
 
-from groundstation.core.library import PURE
-from groundstation.star_tracking.compiled_search import STRUCTURES
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, StarFix
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
+pytestmark = pytest.mark.core
+
+BOTH = (StarTracker, oracle_tracker)
+
 
 @pytest.fixture(scope="module")
-def core(compiled_core):
-    return compiled_core
-
-
-@pytest.fixture(scope="module")
-def twins(catalogue, camera, core):
-    return StarTracker(catalogue, camera, core=core), StarTracker(catalogue, camera, core=PURE)
+def twins(catalogue, camera):
+    return [make(catalogue, camera) for make in BOTH]
 
 
 def spots_at(uv, rng, sigma_px=0.03):
@@ -62,12 +59,6 @@ def assert_equal(one, two):
     assert one.evidence_nats == pytest.approx(two.evidence_nats, abs=1e-6)
 
 
-def test_the_structures_are_laid_out_as_in_c(core):
-    sizes = (ctypes.c_int64 * len(STRUCTURES))()
-    core.function("gs_star_sizes", None, ctypes.c_void_p)(sizes)
-    assert list(sizes) == [ctypes.sizeof(structure) for structure in STRUCTURES]
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -104,10 +95,10 @@ def test_a_prior_that_is_none_ends_in_lost_in_space(painter, twins, variance):
 
 @pytest.mark.parametrize("exposure_s", [0.0, 0.01])
 @pytest.mark.parametrize("readout_s", [0.0, 0.025])
-def test_with_a_known_motion(painter, catalogue, camera, core, exposure_s, readout_s):
+def test_with_a_known_motion(painter, catalogue, camera, exposure_s, readout_s):
     rng = np.random.default_rng(12)
     rolling = TrackerSettings(exposure_s=exposure_s, readout_s=readout_s)
-    twins = [StarTracker(catalogue, camera, rolling, which) for which in (core, PURE)]
+    twins = [make(catalogue, camera, rolling) for make in BOTH]
     velocity = (0.3, -0.2, 0.5)
     spots = detect(painter.paint(rng, (2.4, 1.8, 0.7), velocity, exposure_s, readout_s))
     one, two = (twin.solve(spots, motion=BodyMotion(*velocity)) for twin in twins)
@@ -169,28 +160,28 @@ def test_more_spots_than_ever_before(painter, twins):
 
 
 @pytest.mark.parametrize("stars", [4, 5, 9])
-def test_a_small_sky(camera, core, stars):
+def test_a_small_sky(camera, stars):
     rng = np.random.default_rng(stars)
     sky = StarCatalogue.from_positions(rng.uniform((0.0, 0.0), (1.2, 0.9), (stars, 2)))
-    twins = [StarTracker(sky, camera, core=which) for which in (core, PURE)]
+    twins = [make(sky, camera) for make in BOTH]
     spots = spots_at(rng.uniform((10.0, 10.0), (630.0, 470.0), (12, 2)), rng)
     one, two = (twin.solve(spots) for twin in twins)
     assert_equal(one, two)
 
 
-def test_a_sky_whose_stars_are_farther_apart_than_a_picture_shows(camera, core):
+def test_a_sky_whose_stars_are_farther_apart_than_a_picture_shows(camera):
     sky = StarCatalogue.from_positions(10.0 * np.array([[0, 0], [1, 0], [0, 1], [1, 1.3]]))
     rng = np.random.default_rng(18)
     spots = spots_at(rng.uniform((10.0, 10.0), (630.0, 470.0), (8, 2)), rng)
-    for which in (core, PURE):
-        assert isinstance(StarTracker(sky, camera, core=which).solve(spots), NoFix)
+    for make in BOTH:
+        assert isinstance(make(sky, camera).solve(spots), NoFix)
 
 
-def test_caps_of_work_are_the_same(painter, catalogue, camera, core):
+def test_caps_of_work_are_the_same(painter, catalogue, camera):
     rng = np.random.default_rng(19)
     for change in ({"look_ups": 300}, {"candidates": 2}, {"look_ups": 0}, {"pair_spots": 4}):
         tight = replace(TrackerSettings(), **change)
-        twins = [StarTracker(catalogue, camera, tight, which) for which in (core, PURE)]
+        twins = [make(catalogue, camera, tight) for make in BOTH]
         for stars, lights in ((0, 12), (6, 10), (20, 20)):
             spots, _ = mixed_sky(painter, rng, stars, lights, 0.1)
             one, two = (twin.solve(spots) for twin in twins)

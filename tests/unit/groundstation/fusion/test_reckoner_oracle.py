@@ -1,4 +1,4 @@
-"""The compiled reckoner and the plain one are the same machine: every bit of every answer."""
+"""The reckoner and its oracle in plain Python are the same machine: every bit of every answer."""
 
 import math
 
@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles.carrier import OracleCarrier
+from oracles.late_fix import OracleLateFix
+from oracles.reckoner import OracleReckoner
 
-from groundstation.core.library import PURE
+from groundstation.core.library import default_core
+from groundstation.fusion import checkpoint, error_state_filter
 from groundstation.fusion import error_state as es
-from groundstation.fusion.compiled_reckoner import make_reckoner
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Counters, Fix, ImuPacket
+from groundstation.fusion.estimator import Counters, Fix, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.reckoner import Reckoner
 from groundstation.fusion.slope_grid import SlopeGrid
+
+pytestmark = pytest.mark.core
 
 PERIOD_NS = 10_000_000
 NOISE = NoiseModel(
@@ -48,20 +54,15 @@ def bits(values):
     return np.array([*values], dtype=np.float64).tobytes()
 
 
-@pytest.fixture(scope="module")
-def both(compiled_core):
-    def made(table_map=None):
-        return [make_reckoner(NOISE, Counters(), table_map, core) for core in (compiled_core, PURE)]
-
-    return made
+def both(table_map=None):
+    return [kind(NOISE, Counters(), table_map) for kind in (Reckoner, OracleReckoner)]
 
 
 def loaded(reckoner, seed):
     rng = np.random.default_rng(seed)
     reckoner.has_pose, reckoner.is_lost = True, bool(seed % 2)
-    reckoner.checkpoint_s = reckoner.newest_s - 0.3
     reckoner.load(es.initial_state(NOISE) + rng.normal(0.0, 0.01, es.SIZE), rng.normal(0.0, 0.3, es.MOVING))
-    reckoner.variance = rng.uniform(0.0, 1e-6, 13).tolist()
+    reckoner.trust(reckoner.newest_s - 0.3, rng.uniform(0.0, 1e-6, 13).tolist())
 
 
 def assert_same(first, second):
@@ -78,7 +79,7 @@ def assert_same(first, second):
 @settings(max_examples=60, deadline=None)
 @given(before=st.lists(packets, max_size=30), after=st.lists(packets, max_size=60), rests=st.booleans())
 @pytest.mark.parametrize("table_map", [None, MAP], ids=["no map", "map"])
-def test_both_say_the_same_whatever_comes(both, table_map, before, after, rests):
+def test_both_say_the_same_whatever_comes(table_map, before, after, rests):
     pair = both(table_map)
     t_ns, number = 1_000_000_000, 0
     for part, packets_of_it in enumerate((before, after)):
@@ -90,14 +91,14 @@ def test_both_say_the_same_whatever_comes(both, table_map, before, after, rests)
             packet = ImuPacket(t_ns + jitter_ns, max(ticks, 1) * 0.01, omega, ax, ay, temperature_c)
             if rests and number == 40:
                 for reckoner in pair:
-                    reckoner.rest_from_s, reckoner.rest_to_s = reckoner.newest_s, reckoner.newest_s + 0.1
+                    reckoner.rest(reckoner.newest_s, reckoner.newest_s + 0.1)
             taken = [reckoner.add(packet) for reckoner in pair]
             assert taken[0] is taken[1]
             assert_same(*pair)
 
 
 @pytest.mark.parametrize("restart", [25, 60])
-def test_both_follow_a_clock_that_jumped_back(both, restart):
+def test_both_follow_a_clock_that_jumped_back(restart):
     pair = both()
     for number in range(100):
         t_ns = (1000 + number if number < 30 else 1 + number) * PERIOD_NS
@@ -111,11 +112,21 @@ def test_both_follow_a_clock_that_jumped_back(both, restart):
     assert pair[0]._counters.by_name["clock_jumped_back"] == 1
 
 
-def test_the_filter_takes_either_core(compiled_core):
+def test_records_are_laid_out_as_the_core_declares_them():
+    ffi = default_core().ffi
+    for record in (ImuPacket, PlanarState):
+        assert tuple(name for name, _ in ffi.typeof(record.__name__).fields) == record._fields
+
+
+def test_the_filter_on_oracles_estimates_the_same(monkeypatch):
     rng = np.random.default_rng(2)
     cov = np.diag([1e-6, 1e-6, 1e-6])
     reports = []
-    filters = [ErrorStateFilter(NOISE, core=core) for core in (compiled_core, PURE)]
+    filters = [ErrorStateFilter(NOISE)]
+    monkeypatch.setattr(error_state_filter, "Reckoner", OracleReckoner)
+    monkeypatch.setattr(checkpoint, "Carrier", OracleCarrier)
+    monkeypatch.setattr(checkpoint, "LateFix", OracleLateFix)
+    filters.append(ErrorStateFilter(NOISE))
     for number in range(1, 1200):
         readings_now = rng.normal(0.0, 1e-3, 3)
         said = [f.add_imu(ImuPacket(number * PERIOD_NS, 0.01, *readings_now, 25.0)) for f in filters]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from groundstation.star_tracking.robust import middle_value
+from oracles.robust import middle_value
 
 Vector = NDArray[np.float64]
 

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.evidence import Chance, evidence_nats
 from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
-from groundstation.star_tracking.motion import row_delays_s, smear_from_motion, to_middle_row, unbend
-from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
-from groundstation.star_tracking.refinement import Pose, refine, spot_covariance
+from groundstation.star_tracking.rays import CeilingPoints, CeilingRays, spot_covariance
 from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from oracles.evidence import Chance, evidence_nats
+from oracles.motion import row_delays_s, smear_from_motion, to_middle_row, unbend
+from oracles.refinement import Pose, refine
+from oracles.sky_look_up import nearest
 
 Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
@@ -124,7 +125,7 @@ class Settler:
 
     def _match(self, q: Complex, turn: complex, shift: complex, gate_m: float) -> tuple[Index, Index]:
         """Give (spot, star) within the gate; of two spots at one star the nearer one."""
-        star, distance = self._sky.nearest(turn * q + shift)
+        star, distance = nearest(self._sky, turn * q + shift)
         spot = np.flatnonzero((distance < gate_m) & ~self._is_dropped[star])
         if len(spot) == 0:
             return spot, spot

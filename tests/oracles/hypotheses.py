@@ -10,11 +10,6 @@ from groundstation.star_tracking.sky_index import SkyIndex, TriangleTable, flat_
 Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 
-# Ranks of the neighbours (0 = nearest) that form a triangle with each spot, the most useful first:
-# not the very nearest alone, whose short arm tells the heading badly.
-NEIGHBOUR_RANKS = ((0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (0, 3), (3, 5), (2, 3), (1, 4), (0, 4))
-RANK_GROUPS = (2, 6, 10)  # they are tried in groups that end here
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:

@@ -1,13 +1,16 @@
 # ruff: noqa: N806 - P, H, R as in the literature
-"""The compiled steps of a late fix do what the NumPy code does, to rounding."""
+"""The steps of a late fix do what their oracle in NumPy does, to rounding."""
 
 import numpy as np
 import pytest
+from oracles.late_fix import OracleLateFix
 
-from groundstation.core.library import PURE
+from groundstation.core.library import default_core
 from groundstation.fusion import error_state as es
 from groundstation.fusion.late_fix import LateFix
-from groundstation.fusion.learned_surface import LearnedSurface
+from groundstation.fusion.learned_surface import MAX_NODES, LearnedSurface
+
+pytestmark = pytest.mark.core
 
 LENGTH_M = 0.2
 
@@ -21,8 +24,8 @@ def made(seed, nodes):
 
 
 @pytest.fixture
-def both(noise, compiled_core):
-    return [LateFix(noise, core) for core in (compiled_core, PURE)]
+def both(noise):
+    return [LateFix(noise), OracleLateFix(noise)]
 
 
 def assert_close(found, expected):
@@ -80,3 +83,19 @@ def test_what_is_not_a_number_is_outside_the_gate(both):
         nis = each.correct(after, P.copy(), np.full(3, np.nan), np.ones((3, es.SIZE)), np.eye(3), 25.0).nis
         assert not nis <= 25.0
         assert after.tobytes() == x.tobytes()
+
+
+def test_the_core_has_room_for_all_nodes_of_a_surface():
+    assert default_core().lib.MAX_NODES >= MAX_NODES
+
+
+def test_the_states_stand_in_the_order_of_the_header():
+    lib = default_core().lib
+    names = (
+        *("THETA", "VX", "VY", "PX", "PY", "GYRO_BIAS", "ACC_BIAS_X", "ACC_BIAS_Y", "SLOPE_X", "SLOPE_Y"),
+        *("GYRO_SCALE", "LEVER_X", "LEVER_Y", "WAVE_X", "WAVE_Y", "GYRO_TEMPCO", "ACC_TEMPCO_X"),
+        *("ACC_TEMPCO_Y", "FIX_DELAY", "SIZE", "MOVING"),
+    )
+    for name in names:
+        assert getattr(lib, name) == getattr(es, name), name
+    assert [es.ACC_MATRIX + k for k in range(4)] == [lib.MXX, lib.MXY, lib.MYX, lib.MYY]

@@ -1,15 +1,17 @@
-"""The compiled carrier does what the NumPy functions of `flight` do, to rounding."""
+"""The carrier does what its oracle in NumPy does, to rounding."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles.carrier import OracleCarrier
 
-from groundstation.core.library import PURE
 from groundstation.fusion import error_state as es
 from groundstation.fusion.carrier import Carrier
 from groundstation.fusion.packet_history import PacketHistory
 from groundstation.fusion.slope_grid import SlopeGrid
+
+pytestmark = pytest.mark.core
 
 RNG = np.random.default_rng(5)
 MAP = SlopeGrid(-1.0, -1.0, 0.25, *RNG.normal(0.0, 3e-3, (3, 9, 9)), mean_m_s2=(1e-3, -2e-3))
@@ -43,12 +45,12 @@ def assert_close(found, expected):
 @pytest.mark.parametrize("holes", [0, 4])
 @pytest.mark.parametrize("period", [0.01, 0.001])
 @pytest.mark.parametrize("seed", range(4))
-def test_both_carry_a_stretch_alike(noise, compiled_core, table_map, holes, period, seed):
+def test_both_carry_a_stretch_alike(noise, table_map, holes, period, seed):
     rng = np.random.default_rng(seed)
     history, end_s = a_history(rng, 120, period, holes)
     x = a_state(rng)
     noise = replace(noise, packet_period_s=period, gyro_lag_s=4e-3, acc_lag_s=9e-3)
-    cores = [Carrier(noise, table_map, core) for core in (compiled_core, PURE)]
+    cores = [Carrier(noise, table_map), OracleCarrier(noise, table_map)]
     cuts = np.sort(rng.uniform(-0.1 * end_s, 1.1 * end_s, 4))
     for start_s, stop_s in [(0.0, end_s), *zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)]:
         compiled, pure = (carrier.carry(x, history, start_s, stop_s) for carrier in cores)
@@ -65,16 +67,16 @@ def test_both_carry_a_stretch_alike(noise, compiled_core, table_map, holes, peri
             assert_close(compiled.noise[row], pure.noise[row])
 
 
-def test_a_stretch_within_one_packet_is_cut_at_both_ends(noise, compiled_core):
+def test_a_stretch_within_one_packet_is_cut_at_both_ends(noise):
     history = PacketHistory()
     history.rows.extend((1.0, 1.0, 0.2, 0.1, 0.0, 0.0, 0.0))
-    found = Carrier(noise, None, compiled_core).carry(np.zeros(es.SIZE), history, 0.25, 0.75)
+    found = Carrier(noise, None).carry(np.zeros(es.SIZE), history, 0.25, 0.75)
     assert found.duration_s == pytest.approx(0.5)
     assert found.moved[es.THETA] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("name", ["compiled", "pure"])
-def test_nothing_stored_carries_nothing(noise, compiled_core, name):
-    carrier = Carrier(noise, None, compiled_core if name == "compiled" else PURE)
+@pytest.mark.parametrize("kind", [Carrier, OracleCarrier])
+def test_nothing_stored_carries_nothing(noise, kind):
+    carrier = kind(noise, None)
     assert carrier.carry(np.zeros(es.SIZE), PacketHistory(), 0.0, 1.0) is None
     assert carrier.fly(np.zeros(es.SIZE), PacketHistory(), 0.0, 1.0) is None

@@ -16,9 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-STRAY_RATIO = 0.5
-SIGMAS_PX = (0.06, 0.2, 0.7)
-"""Errors of a calibrated camera under a surveyed sky: from a bright star to a blurred one."""
+from groundstation.star_tracking.settings import SIGMAS_PX, STRAY_RATIO
 
 
 @dataclass(frozen=True, slots=True)
