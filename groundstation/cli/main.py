@@ -72,7 +72,7 @@ def build(words: list[str]) -> typer.Typer:
         rows = {called: COMMANDS[called]}
     else:
         found = extension(called)
-        rows = COMMANDS | extensions() if found is None else {called: found}
+        rows = extensions() | COMMANDS if found is None else {called: found}
     for name, row in rows.items():
         if name == called:
             _add(app, name, row, words[1:])

@@ -1,6 +1,15 @@
-"""A sky for the star tracking tests: painted through OpenCV's projection, not through ours."""
+"""Made-up skies and flights for tests of several rooms.
 
+Skies are painted through OpenCV's projection, not through ours; flights with truth are made by the
+laboratory in tools/fusion_truth.py.
+"""
+
+import importlib
+import sys
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -133,3 +142,37 @@ def catalogue(painter):
 @pytest.fixture(scope="session")
 def camera():
     return CAMERA
+
+
+ROOT = Path(__file__).parents[2]
+
+
+@cache
+def _laboratory() -> ModuleType:
+    tools = str(ROOT / "tools")
+    sys.path.insert(0, tools)  # its parts import each other by name
+    try:
+        return importlib.import_module("fusion_truth")
+    finally:
+        sys.path.remove(tools)
+
+
+@pytest.fixture(scope="session")
+def fusion_truth() -> ModuleType:
+    return _laboratory()
+
+
+@pytest.fixture(scope="session")
+def make_folder(tmp_path_factory):
+    """Write a data set once per settings and return its folder."""
+    made = {}
+
+    def make(**settings) -> Path:
+        key = tuple(sorted(settings.items()))
+        if key not in made:
+            laboratory = _laboratory()
+            made[key] = tmp_path_factory.mktemp("fusion")
+            laboratory.write(laboratory.make(laboratory.Laboratory(**settings)), made[key])
+        return made[key]
+
+    return make

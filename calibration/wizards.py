@@ -20,7 +20,7 @@ from typing import Protocol
 import zenoh
 
 from calibration.delivery import deliver
-from calibration.imu.guided import Advice
+from calibration.guidance import Advice
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Provenance
 from groundstation.declarations.errors import GroundStationError, UsageError

@@ -1,7 +1,7 @@
-"""The guided calibration: what to do next, and when there is enough data.
+"""A guided calibration: what to do next, and when there is enough data.
 
-The sequence knows nothing of devices. It is told what a filter knows by now (sigmas) and what the vehicle
-does, and says which step is due and what is missing. Steps are rows of a table.
+The sequence knows nothing of devices. It takes what a filter knows by now (sigmas) and what the vehicle does,
+and returns which step is due and what is missing. Steps are rows of a table.
 """
 
 from __future__ import annotations
@@ -39,42 +39,9 @@ class Step:
     """After this long it is given up, with what is known by then."""
 
 
-STEPS: tuple[Step, ...] = (
-    Step(
-        "rest",
-        "Land the vehicle (float air off) and keep your hands off table and vehicle.",
-        True,
-        (Goal("rest_s", 20.0, "s", is_amount=True), Goal("gyro_bias_sigma_rad_s", 3e-4, "rad/s")),
-        120.0,
-    ),
-    Step(
-        "turn",
-        "Float, and turn the vehicle by more than two full turns, some one way and some the other.",
-        False,
-        (
-            Goal("turned_rad", 12.6, "rad", is_amount=True),
-            Goal("gyro_scale_sigma", 2e-3, "1"),
-            Goal("lever_sigma_m", 2e-3, "m"),
-        ),
-        240.0,
-    ),
-    Step(
-        "push",
-        "Fly to and fro along both axes of the table, with the vehicle turned by a quarter in between.",
-        False,
-        (
-            Goal("travelled_m", 2.0, "m", is_amount=True),
-            Goal("slope_sigma_m_s2", 4e-4, "m/s^2"),
-            Goal("acc_scale_sigma", 2.5e-2, "1"),
-        ),
-        240.0,
-    ),
-)
-
-
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to tell the operator now."""
+    """What the operator is to do now."""
 
     step: Step | None
     """None when all is done."""
@@ -90,10 +57,10 @@ class GuidedSequence:
     """Walks through the steps.
 
     Args:
-        steps: the table; the usual one by default.
+        steps: the table.
     """
 
-    def __init__(self, steps: tuple[Step, ...] = STEPS) -> None:
+    def __init__(self, steps: tuple[Step, ...]) -> None:
         self._steps = steps
         self._number = -1
         self._since_s = 0.0

@@ -1,4 +1,5 @@
-from calibration.imu.guided import STEPS, GuidedSequence
+from calibration.guidance import GuidedSequence
+from calibration.imu.guided_imu import STEPS
 
 EVERYTHING = {
     "rest_s": 1e3, "gyro_bias_sigma_rad_s": 0.0, "turned_rad": 1e3, "gyro_scale_sigma": 0.0,
@@ -7,14 +8,14 @@ EVERYTHING = {
 
 
 def test_the_first_word_is_to_land():
-    advice = GuidedSequence().update(0.0, {})
+    advice = GuidedSequence(STEPS).update(0.0, {})
     assert advice.is_new
     assert advice.step.is_rest
     assert "Land" in advice.step.instruction
 
 
 def test_a_step_ends_when_every_goal_is_reached():
-    sequence = GuidedSequence()
+    sequence = GuidedSequence(STEPS)
     sequence.update(0.0, {"rest_s": 50.0})
     early = sequence.update(10.0, {"rest_s": 60.0, "gyro_bias_sigma_rad_s": 1e-4})
     assert not early.is_new
@@ -26,7 +27,7 @@ def test_a_step_ends_when_every_goal_is_reached():
 
 
 def test_amounts_count_from_the_beginning_of_their_step():
-    sequence = GuidedSequence()
+    sequence = GuidedSequence(STEPS)
     sequence.update(0.0, {})
     known = {name: (0.0 if "sigma" in name else 1e3) for name in EVERYTHING}
     assert sequence.update(1.0, known).step.name == "turn"
@@ -34,7 +35,7 @@ def test_amounts_count_from_the_beginning_of_their_step():
 
 
 def test_a_step_that_leads_nowhere_is_given_up_and_said_so():
-    sequence = GuidedSequence()
+    sequence = GuidedSequence(STEPS)
     sequence.update(0.0, {})
     advice = sequence.update(STEPS[0].longest_s + 1.0, {"rest_s": 3.0, "gyro_bias_sigma_rad_s": 1e-5})
     assert advice.step.name == "turn"
@@ -42,7 +43,7 @@ def test_a_step_that_leads_nowhere_is_given_up_and_said_so():
 
 
 def test_after_the_last_step_there_is_nothing_to_do():
-    sequence = GuidedSequence()
+    sequence = GuidedSequence(STEPS)
     known = dict(EVERYTHING)
     for k in range(2 * len(STEPS) + 2):
         known = {name: value + (1e3 if "sigma" not in name else 0.0) for name, value in known.items()}
