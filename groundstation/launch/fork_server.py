@@ -247,7 +247,7 @@ def _adopt_orphans() -> None:
 
 
 def share_one_arena() -> None:
-    """Let all threads of a process allocate from one place; one for each thread costs a megabyte a process."""
+    """Let all threads of a process allocate from one place: one for each costs a megabyte a process."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc has it
     if mallopt is not None:
         mallopt(_ARENA_MAX, 1)
