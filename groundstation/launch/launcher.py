@@ -75,13 +75,14 @@ class Launcher:
         self._began_s = 0.0
         self._time = RunningTime()
         self._fork_server = ForkServer(("groundstation.launch.preload",))
+        self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
         self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
     def start(self) -> None:
-        """Start everything; processes go once the laboratory has announced its ports."""
+        """Start what processes need; they are started, and go, as soon as that is there."""
         self._began_s = time.monotonic()
         share_one_arena()
         if self._laboratory is not None:
@@ -90,8 +91,6 @@ class Launcher:
         self.endpoint, self._hub = _open_hub()
         self.bus = ZenohBus(self.endpoint)
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
-        for child in self._children.values():
-            self._start(child)
 
     @property
     def children(self) -> list[Child]:
@@ -139,6 +138,10 @@ class Launcher:
             self._say("the fork server has ended; another one was started, the processes go on")
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
+        if self._unstarted and self._fork_server.is_loaded:
+            for child in self._unstarted:
+                self._start(child)
+            self._unstarted.clear()
         self._let_go()
         for child in self._children.values():
             self._look_after(child, now_s)
@@ -181,10 +184,10 @@ class Launcher:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
 
     def _look_after(self, child: Child, now_s: float) -> None:
-        if child.name != RECORDER and self._addresses is None:
-            return  # it waits for the laboratory
+        if child.pid is None or (child.name != RECORDER and self._addresses is None):
+            return  # it waits for the fork server or the laboratory
         if child.restart_at_s is not None:
-            if now_s >= child.restart_at_s:
+            if now_s >= child.restart_at_s and self._fork_server.is_loaded:
                 child.restarts += 1
                 self._start(child)
         elif child.has_ended:
