@@ -36,7 +36,7 @@ def fly_and(launch, rig, name, number):
 
 def of(path, kind, vehicle):
     with Recording(path) as recording:
-        return [row.payload for row in recording.delivered([kind.TOPIC], [vehicle])]
+        return [row.payload for row in recording.delivered([kind], [vehicle])]
 
 
 def longest_silence_s(payloads):

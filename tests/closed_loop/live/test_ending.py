@@ -16,7 +16,7 @@ RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 
 def newest(path, kind, vehicle):
     with Recording(path) as recording:
-        return list(recording.delivered([kind.TOPIC], [vehicle]))[-1].payload
+        return list(recording.delivered([kind], [vehicle]))[-1].payload
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
