@@ -2,8 +2,8 @@ r"""Wire format of the range finder: lines to readings and back, pure.
 
 The device looks along body +x and sends one line per measurement, 115200 Bd, 8N1::
 
-    $LRF,<number>,<millimetres>*<checksum>\r\n        $LRF,17,1655.2*4E
-    $LRF,<number>,*<checksum>\r\n                     $LRF,18,*6E         (no echo)
+    $LRF,<number>,<millimetres>*<checksum>\r\n        $LRF,17,1655.2*45
+    $LRF,<number>,*<checksum>\r\n                     $LRF,18,*51         (no echo)
 
 ``number`` counts measurements, 0 to 65535 and again. ``checksum`` is the exclusive or of all bytes between
 ``$`` and ``*``, two hexadecimal digits (as in NMEA 0183).
@@ -75,7 +75,7 @@ class LineParser:
 
 
 def _parse(line: bytes) -> Reading | None:
-    found = _LINE.fullmatch(line)
+    found = _LINE.fullmatch(line, max(line.rfind(b"$"), 0))  # the end of the line before may be damaged
     if found is None or reduce(xor, found[1]) != int(found[4], 16) or int(found[2]) >= NUMBERS:
         return None
     return Reading(int(found[2]), None if found[3] is None else float(found[3]) * 1e-3)
