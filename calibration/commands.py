@@ -23,9 +23,9 @@ CALIBRATE = Group(
         "joint": Command(
             "calibration.imu.commands:joint", "IMU: every constant of a mock-up at once from one flight."
         ),
-        "imu": Command("calibration.imu.guided_imu:imu", "IMU: a running vehicle, step by step."),
+        "imu": Command("calibration.guided_commands:imu", "IMU: a running vehicle, step by step."),
         "guided": Command(
-            "calibration.imu.guided_imu:guided", "A running vehicle, step by step, by any installed wizard."
+            "calibration.guided_commands:guided", "A running vehicle, step by step, by any installed wizard."
         ),
         "table-map": Command(
             "calibration.table.commands:table_map", "Table: slope and waves from flights, how to level it."

@@ -73,7 +73,7 @@ def opened(source: Path, rig_path: Path | None = None) -> Iterator[tuple[Recordi
 
     Raises:
         RecordingError: The recording cannot be read.
-        UsageError: It says nothing of its rig, or the rig is wrong.
+        UsageError: It holds no rig, or the rig is wrong.
     """
     with Recording(source) as recording:
         if rig_path is not None:
@@ -81,7 +81,7 @@ def opened(source: Path, rig_path: Path | None = None) -> Iterator[tuple[Recordi
         elif recording.info.rig_toml:
             rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path or source))
         else:
-            raise UsageError(f"{source} says nothing of its rig: name one with --rig.")
+            raise UsageError(f"{source} holds no rig: name one with --rig.")
         yield recording, rig
 
 

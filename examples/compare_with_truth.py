@@ -16,18 +16,28 @@ from groundstation.recording.reader import Recording
 
 def states(recording: Recording, vehicle: str) -> np.ndarray:
     """Rows of t (s), x, y (m), heading (rad, unwrapped) and their standard deviations, shape (n, 7)."""
-    found = (message.payload for message in recording.messages([VehicleState.TOPIC], [vehicle]))
-    said = [state for state in found if isinstance(state, VehicleState)]
-    rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad, *s.pose_std) for s in said])
+    found = (message.payload for message in recording.messages([VehicleState], [vehicle]))
+    rows = np.array(
+        [
+            (state.stamp_ns * 1e-9, *state.position_table_m, state.heading_rad, *state.pose_std)
+            for state in found
+            if isinstance(state, VehicleState)
+        ]
+    )
     rows[:, 3] = np.unwrap(rows[:, 3])
     return rows
 
 
 def truths(recording: Recording, vehicle: str) -> np.ndarray:
     """Rows of t (s), x, y (m), heading (rad, unwrapped), shape (n, 4)."""
-    found = (message.payload for message in recording.messages([ReferenceState.TOPIC], [vehicle]))
-    said = [truth for truth in found if isinstance(truth, ReferenceState)]
-    rows = np.array([(s.stamp_ns * 1e-9, *s.position_table_m, s.heading_rad) for s in said])
+    found = (message.payload for message in recording.messages([ReferenceState], [vehicle]))
+    rows = np.array(
+        [
+            (truth.stamp_ns * 1e-9, *truth.position_table_m, truth.heading_rad)
+            for truth in found
+            if isinstance(truth, ReferenceState)
+        ]
+    )
     rows[:, 3] = np.unwrap(rows[:, 3])
     return rows
 
@@ -54,7 +64,7 @@ def main() -> None:
     parser.add_argument("recording", type=Path)
     with Recording(parser.parse_args().recording) as recording:
         for channel in recording.channels:
-            if channel.topic is ReferenceState.TOPIC:
+            if channel.noun == ReferenceState.TOPIC.noun:
                 state, truth = states(recording, channel.owner), truths(recording, channel.owner)
                 state = state[(state[:, 0] >= truth[0, 0]) & (state[:, 0] <= truth[-1, 0])]
                 off = sentence(errors(state, truth))

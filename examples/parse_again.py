@@ -29,7 +29,7 @@ def main() -> None:
     frames = FrameParser()  # finds out by itself which version the block speaks
     samples: list[tuple[float, float, float]] = []
     with Recording(arguments.recording) as recording:
-        for message in recording.messages([ImuBytes.TOPIC], [arguments.vehicle]):
+        for message in recording.messages([ImuBytes], [arguments.vehicle]):
             assert isinstance(message.payload, ImuBytes)
             for frame in frames.feed(message.payload.data):
                 if isinstance(frame, ImuFrame):

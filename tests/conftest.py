@@ -10,6 +10,8 @@ from click.testing import Result
 from hypothesis import settings
 from typer.testing import CliRunner
 
+from groundstation.core import library
+
 settings.register_profile("everywhere", deadline=None, derandomize=True)
 settings.load_profile("everywhere")
 
@@ -47,11 +49,9 @@ def own_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--core-library", help="run the tests of the compiled core, with this library of it")
+    parser.addoption("--core-folder", help="use the build of the core that lies here")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.getoption("--core-library"):
-        others = [item for item in items if "compiled_core" not in getattr(item, "fixturenames", ())]
-        config.hook.pytest_deselected(items=others)
-        items[:] = [item for item in items if item not in others]
+def pytest_configure(config: pytest.Config) -> None:
+    if chosen := config.getoption("--core-folder"):
+        library.built_folder = lambda: Path(chosen)

@@ -8,8 +8,7 @@ the star camera delivered, the names of the stars are the star tracker's answer 
 
 import argparse
 import math
-import runpy
-from collections.abc import Callable
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars.messages import StarImage
 from groundstation.parts.valves.messages import ValveCommand
+from groundstation.rig.read import load_rig
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import StarFix
@@ -212,9 +212,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures" / "two_mock_ups.png")
     parser.add_argument("--duration", type=float, default=104.0, help="virtual seconds")
     arguments = parser.parse_args()
-    fly: Callable[..., None] = runpy.run_path(str(ROOT / "examples" / "fly_a_square.py"))["fly"]
+    sys.path.insert(0, str(ROOT / "examples"))
+    import fly_a_square
+    import waypoints
+
     flight = Flight()
-    fly(arguments.duration, [flight])
+    waypoints.fly(load_rig(fly_a_square.RIG), arguments.duration, fly_a_square.tours(), [flight])
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     compose(flight, arguments.out)
     print(arguments.out)

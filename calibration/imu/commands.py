@@ -14,8 +14,6 @@ from calibration.imu import joint as joint_procedure
 from calibration.imu import procedures
 from calibration.imu import tilt as tilt_procedure
 from calibration.result import provenance_of, provenance_of_several
-from calibration.table.procedure import map_of_sources
-from calibration.table.smoothed_flights import read_source
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.fusion.table_map import TableMap
@@ -158,6 +156,9 @@ def joint(
 
     Example: groundstation calibrate joint samples/fusion/spin --out joint.toml --plot residuals.png
     """
+    from calibration.table.procedure import map_of_sources  # half of what is loaded, for one option
+    from calibration.table.smoothed_flights import read_source
+
     check_targets(out, plot, table_map)
     data = read_flight(source, vehicle)
     with refusing(source):

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-import typer
-
-from calibration.imu.guided import Advice, GuidedSequence
+from calibration.guidance import Advice, Goal, GuidedSequence, Step
 from calibration.imu.joint import constants, widened
 from calibration.outcome import Outcome
 from calibration.result import quantity_lines
-from calibration.wizard import Wish, lead
-from groundstation.declarations.errors import UsageError
+from calibration.wizards import Wish
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.fusion import error_state as es
@@ -26,6 +22,37 @@ from groundstation.parts.overhead.messages import OverheadFix
 from groundstation.parts.stars.messages import StarFix
 from groundstation.parts.valves.messages import ValveStatus
 
+STEPS: tuple[Step, ...] = (
+    Step(
+        "rest",
+        "Land the vehicle (float air off) and keep your hands off table and vehicle.",
+        True,
+        (Goal("rest_s", 20.0, "s", is_amount=True), Goal("gyro_bias_sigma_rad_s", 3e-4, "rad/s")),
+        120.0,
+    ),
+    Step(
+        "turn",
+        "Float, and turn the vehicle by more than two full turns, some one way and some the other.",
+        False,
+        (
+            Goal("turned_rad", 12.6, "rad", is_amount=True),
+            Goal("gyro_scale_sigma", 2e-3, "1"),
+            Goal("lever_sigma_m", 2e-3, "m"),
+        ),
+        240.0,
+    ),
+    Step(
+        "push",
+        "Fly to and fro along both axes of the table, with the vehicle turned by a quarter in between.",
+        False,
+        (
+            Goal("travelled_m", 2.0, "m", is_amount=True),
+            Goal("slope_sigma_m_s2", 4e-4, "m/s^2"),
+            Goal("acc_scale_sigma", 2.5e-2, "1"),
+        ),
+        240.0,
+    ),
+)
 GO_TO_EVERY_S = 9.0
 SETTLE_S = 2.0
 TURN_DEG = 120.0
@@ -49,7 +76,7 @@ class GuidedImu:
         self._vehicle = vehicle
         self._smoother = OfflineSmoother(widened(rig_noise(rig, vehicle)))
         self._node = fusion_node(rig, vehicle, self._smoother)
-        self._sequence = GuidedSequence()
+        self._sequence = GuidedSequence(STEPS)
         self._advice: Advice | None = None
         self._floats = True
         self._stamp_ns = 0
@@ -153,42 +180,3 @@ class ImuWizard:
 
 
 WIZARD = ImuWizard()
-
-RigFile = Annotated[Path, typer.Argument(help="Rig file of the run that is going on.")]
-Out = Annotated[Path, typer.Option(help="TOML to write.")]
-Vehicle = Annotated[str | None, typer.Option(help="Name of the vehicle; the rig's first if not given.")]
-Drive = Annotated[
-    bool, typer.Option("--drive", help="Also send the requests: land, float, turn, fly to and fro.")
-]
-
-
-def imu(
-    rig: RigFile,
-    out: Out,
-    guided: Annotated[bool, typer.Option("--guided", help="Say step by step what to do.")] = False,
-    vehicle: Vehicle = None,
-    drive: Drive = False,
-) -> None:
-    """IMU of a running vehicle, step by step: rest, turns, flights; it says when there is enough data.
-
-    Example: groundstation calibrate imu examples/rigs/published.toml --guided --drive --out imu.toml
-    """
-    if not guided:
-        raise UsageError(
-            "the IMU is calibrated step by step: give --guided (recordings: see `calibrate joint`)."
-        )
-    lead("imu", rig, vehicle, out, is_driven=drive)
-
-
-def guided(
-    wizard: Annotated[str, typer.Argument(help="What to calibrate: imu, or what a package adds.")],
-    rig: RigFile,
-    out: Out,
-    vehicle: Vehicle = None,
-    drive: Drive = False,
-) -> None:
-    """Guided calibration of a running vehicle; an installed package can add others.
-
-    Example: groundstation calibrate guided imu examples/rigs/published.toml --drive --out imu.toml
-    """
-    lead(wizard, rig, vehicle, out, is_driven=drive)

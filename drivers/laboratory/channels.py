@@ -29,7 +29,7 @@ class ChannelKind(StrEnum):
     FAILURES = "failures"
     """`FailureEvent` and `FailureRefused` from the laboratory, `InjectOrder` into it."""
     POSES = "poses"
-    """`drivers.motion_capture.pose.MotionCaptureFrame`: the poses that one frame of cameras gave."""
+    """`drivers.motion_capture.pose.MotionCapturePose`: one rigid body as one frame of the cameras saw it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

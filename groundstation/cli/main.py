@@ -72,7 +72,7 @@ def build(words: list[str]) -> typer.Typer:
         rows = {called: COMMANDS[called]}
     else:
         found = extension(called)
-        rows = COMMANDS | extensions() if found is None else {called: found}
+        rows = extensions() | COMMANDS if found is None else {called: found}
     for name, row in rows.items():
         if name == called:
             _add(app, name, row, words[1:])
@@ -137,6 +137,7 @@ def call(words: list[str]) -> int:
     from drivers.errors import DeviceError
     from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import FileError
+    from groundstation.core.library import CoreError
     from groundstation.recording.errors import RecordingError
 
     words = spelled(words)
@@ -147,7 +148,7 @@ def call(words: list[str]) -> int:
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 2
-    except GroundStationError as error:
+    except (GroundStationError, CoreError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 1
     return 0

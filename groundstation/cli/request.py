@@ -18,6 +18,10 @@ _NUMBERS = {"ignore_unknown_options": True}
 app = typer.Typer(rich_markup_mode=None)
 
 
+def _shown(argument: Argument) -> str:
+    return argument.name.replace("_rad", "_deg")
+
+
 def _described() -> str:
     rows = installed_tables().actions.values()
     return "\n\n".join(" ".join([row.name, *map(_shown, row.arguments)]) + f": {row.summary}" for row in rows)
@@ -58,10 +62,6 @@ def request(
     print(f"{vehicle} ({run.rig}): {asked}: {verdict}")
     if not ack.accepted:
         raise typer.Exit(1)
-
-
-def _shown(argument: Argument) -> str:
-    return argument.name.replace("_rad", "_deg")
 
 
 def _values(row: Action, words: list[str]) -> dict[str, object]:

@@ -16,6 +16,7 @@ from groundstation.cli.terminal_view import TerminalView
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.core.library import default_core
 from groundstation.recording.writer import PART_SUFFIX
 from groundstation.rig.read import parse_rig, read_text
 
@@ -45,6 +46,7 @@ def run(
 
     Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
+    default_core()  # before any process starts: what it lacks, all of them would
     text = read_text(rig)
     loaded = parse_rig(text, rig)
     if record is not None and record.exists():

@@ -22,7 +22,7 @@ POSITIVE_KEYS = (
 )  # fmt: skip
 FIX_TIME_POLLS = 1.0
 """How well an exposure's stamp can be laid on the packets: nothing happens between two polls of the sensors.
-Data sets do not say it; live, the clock's own sigma goes into each fix's covariance instead."""
+Data sets do not give it; live, the clock's own sigma goes into each fix's covariance instead."""
 FIX_DELAY_POLLS = 0.5
 """The constant part of it: what the best calibration of a camera's delay leaves."""
 OTHER_KEYS = (

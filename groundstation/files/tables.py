@@ -72,7 +72,7 @@ def parse_table(
 
     Args:
         data: Content of the file.
-        path: Its name, for what is said of it.
+        path: Its name, for messages.
         numbers: Columns of numbers.
         words: Columns of text; cells are stripped.
         optional: Columns that may be missing; numbers are then NaN, words empty.
@@ -92,17 +92,18 @@ def parse_table(
         if found is not None:
             return Table(found, {}, header_line + 1 + np.arange(len(found)))
     rows: list[list[float]] = []
-    said: dict[str, list[str]] = {name: [] for name in words}
+    text_of_column: dict[str, list[str]] = {name: [] for name in words}
+    first_line: dict[tuple[str, str], int] = {}
     lines: list[int] = []
     for line, cells in _rows(text, path, header_line, delimiter):
         if len(cells) != len(header):
             raise FileError(f"{path}: line {line} has {len(cells)} columns, expected {len(header)}.")
         for name in words:
             cell = cells[header.index(name)].strip() if name in header else ""
-            if name in unique and cell in said[name]:
-                first = lines[said[name].index(cell)]
+            first = first_line.setdefault((name, cell), line)
+            if name in unique and first != line:
                 raise FileError(f"{path}: line {line}, {name} '{cell}' appears twice, first in line {first}.")
-            said[name].append(cell)
+            text_of_column[name].append(cell)
         rows.append(
             [
                 math.nan if place < 0 else _number(cells[place], delimiter, path, line, name, is_finite)
@@ -112,7 +113,7 @@ def parse_table(
         lines.append(line)
     if not rows:
         raise FileError(f"{path}: has a header but no rows.")
-    return Table(np.array(rows, dtype=np.float64).reshape(len(rows), -1), said, np.array(lines))
+    return Table(np.array(rows, dtype=np.float64).reshape(len(rows), -1), text_of_column, np.array(lines))
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -72,7 +72,7 @@ def parse_constants(data: bytes, path: Path) -> Constants:
             continue
         value, std = _number(path, key, table, "value"), _number(path, key, table, "std")
         if math.isnan(value) or math.isnan(std):
-            continue  # the calibration itself said that it could not tell
+            continue  # the calibration could not determine it
         if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
             raise FileError(f"{path}: {key} must be finite with a std above zero.")
         if table.get("unit") != UNITS[name]:

@@ -28,7 +28,7 @@ class FlightData:
         stars: (m, 5) exposure s, arrival s, x, y, heading, in the order of arrival.
         run_start_s: Until then the vehicle stands still.
         noise: Of sensors and fixes.
-        covariance: (m, 3, 3) of each fix; what ``noise`` says of all if not given.
+        covariance: (m, 3, 3) of each fix; that of ``noise`` if not given.
         reference: (k, 4) s, x, y, heading by motion capture or an emulator; for judging results only.
         stamp_delay_s: What was taken off the arrivals to give the exposures.
     """

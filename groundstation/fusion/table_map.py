@@ -145,10 +145,10 @@ class TableMap:
         return {grid_path: grid, path: text}
 
     def _text(self, grid_name: str, grid_sha256: str) -> str:
-        said = self.provenance
+        origin = self.provenance
         std = np.sqrt(self.mean_cov_m2_s4.diagonal())
         lines = ["# Table map: what pulls an unpushed vehicle along the table, by place", ""]
-        lines += toml_lines({"made_utc": said.made_utc})
+        lines += toml_lines({"made_utc": origin.made_utc})
         lines += toml_table(
             "grid",
             {
@@ -167,11 +167,11 @@ class TableMap:
         lines += toml_table("mean.covariance", {"value": self.mean_cov_m2_s4.tolist(), "unit": "m^2/s^4"})
         lines += toml_table("mean.uphill_gradient", {"value": tilt[0], "std": tilt[1], "unit": "rad"})
         lines += toml_table("unvisited_std", {"value": self.far_std_m_s2, "unit": "m/s^2"})
-        lines += toml_table("residual.chi_square_ratio", {"value": said.residual_ratio, "unit": "1"})
-        lines += toml_table("flown", {"value": said.flown_s, "unit": "s"})
-        if said.notes:
-            lines += toml_table("notes", said.notes)
-        for name, sha256 in said.recordings.items():
+        lines += toml_table("residual.chi_square_ratio", {"value": origin.residual_ratio, "unit": "1"})
+        lines += toml_table("flown", {"value": origin.flown_s, "unit": "s"})
+        if origin.notes:
+            lines += toml_table("notes", origin.notes)
+        for name, sha256 in origin.recordings.items():
             lines += toml_table("recordings", {"name": name, "sha256": sha256}, is_row=True)
         return "\n".join(lines) + "\n"
 

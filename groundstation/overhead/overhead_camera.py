@@ -85,7 +85,7 @@ class OverheadCamera:
 
         Args:
             data: The content.
-            path: Its name, for what is said of it.
+            path: Its name, for messages.
             known: Stands in for keys that the file lacks.
 
         Raises:

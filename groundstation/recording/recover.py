@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
 from groundstation.recording import records
 from groundstation.recording.errors import RecordingError
+from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
 from groundstation.recording.software import software
-from groundstation.recording.writer import CHUNK_BYTES
 
 
 @dataclass(slots=True)
@@ -55,9 +53,7 @@ def recover(source: Path, target: Path) -> Recovery:
         with source.open("rb") as file:
             data = _mapped(file, source)
             with data, temporary.open("wb") as out:
-                recovery = _Copy(Writer(out, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)).run(
-                    data
-                )
+                recovery = _Copy(data, out).run()
             temporary.replace(target)
     except OSError as error:
         raise RecordingError(f"{error.filename or target}: {error.strerror}") from error
@@ -75,20 +71,21 @@ def _mapped(file: BinaryIO, source: Path) -> mmap.mmap:
 class _Copy:
     """Carries records over; numbers of schemas and channels are given anew."""
 
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
+    def __init__(self, data: mmap.mmap, out: BinaryIO) -> None:
+        self._data = data
+        self._whole = list(records.complete_records(data, len(records.MAGIC)))
+        profile = "ros2"
+        if self._whole and self._whole[0].opcode == Opcode.HEADER:
+            profile, _ = records.read_header(data[self._whole[0].start : self._whole[0].stop])
+        self._writer = McapFile(out, profile, f"{software()} recover")
         self._found = Recovery()
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
         self._new_schemas: dict[int, int] = {}
         self._new_channels: dict[int, int] = {}
 
-    def run(self, data: mmap.mmap) -> Recovery:
-        profile = "ros2"
-        whole = list(records.complete_records(data, len(records.MAGIC)))
-        if whole and whole[0].opcode == Opcode.HEADER:
-            profile, _ = records.read_header(data[whole[0].start : whole[0].stop])
-        self._writer.start(profile=profile, library=f"{software()} recover")
+    def run(self) -> Recovery:
+        data, whole = self._data, self._whole
         for record in whole:  # an index at the end, if there is one, names channels of damaged chunks too
             if record.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
                 self._define(record.opcode, data[record.start : record.stop])
@@ -100,7 +97,7 @@ class _Copy:
         else:
             self._tail(data[end:])
         self._found.was_finished = data[-len(records.MAGIC) :] == records.MAGIC and len(whole) > 1
-        self._writer.finish()  # type: ignore[no-untyped-call]  # unannotated in mcap
+        self._writer.finish()
         return self._found
 
     def _take(self, opcode: int, content: bytes) -> None:
@@ -159,6 +156,6 @@ class _Copy:
         schema = self._new_schemas.get(channel.schema, 0)
         if schema == 0 and channel.schema in self._schemas:
             known = self._schemas[channel.schema]
-            schema = self._writer.register_schema(known.name, known.encoding, known.data)
+            schema = self._writer.add_schema(known.name, known.encoding, known.data)
             self._new_schemas[channel.schema] = schema
-        return self._writer.register_channel(channel.topic, channel.encoding, schema)
+        return self._writer.add_channel(channel.topic, channel.encoding, schema)

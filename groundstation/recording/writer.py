@@ -13,8 +13,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
 
-from mcap.writer import CompressionType, Writer
-
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.record_stream import Recorded
@@ -23,11 +21,11 @@ from groundstation.declarations.message import Message
 from groundstation.recording.channels import channel_name
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
+from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.policy import is_kept
 from groundstation.recording.software import software
 
 PART_SUFFIX = ".part"
-CHUNK_BYTES = 1 << 20
 FLUSH_PERIOD_NS = 250_000_000
 
 
@@ -64,8 +62,7 @@ class Recorder:
         self._schemas: dict[str, int] = {}
         self._latched: dict[tuple[str, str], tuple[int, int]] = {}
         self._file: BinaryIO | None = _open_new(path, self.part_path)
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._writer.start(profile="ros2", library=software())
+        self._writer = McapFile(self._file, profile="ros2", library=software())
         self._writer.add_metadata(METADATA_NAME, info.to_metadata())
         self._file.flush()
 
@@ -125,7 +122,7 @@ class Recorder:
     def finish(self) -> Path:
         """Write the index and give the file its final name; may be called twice."""
         if self._file is not None:
-            self._writer.finish()  # type: ignore[no-untyped-call]  # unannotated in mcap
+            self._writer.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
@@ -149,9 +146,7 @@ class Recorder:
         self.finish()
 
     def _add(self, channel: int, sequence: int, publish_ns: int, data: bytes, log_ns: int) -> None:
-        self._writer.add_message(
-            channel, log_time=log_ns, data=data, publish_time=publish_ns, sequence=sequence
-        )
+        self._writer.add_message(channel, log_ns, data, publish_ns, sequence)
         self.message_count += 1
         if self._flush_due_ns is None:
             self._flush_due_ns = log_ns + self._flush_period_ns
@@ -160,7 +155,7 @@ class Recorder:
 
     def _flush(self) -> None:
         self._flush_due_ns = None
-        self._writer.flush()  # type: ignore[no-untyped-call]  # unannotated in mcap
+        self._writer.flush()
         if self._durable and self._file is not None:
             os.fsync(self._file.fileno())
 
@@ -180,8 +175,8 @@ class Recorder:
         schema = self._schemas.get(noun)
         if schema is None:
             text = schema_text(kind).encode()
-            schema = self._schemas[noun] = self._writer.register_schema(kind.ROS_TYPE, ENCODING, text)
-        return self._writer.register_channel(channel_name(noun, owner), "cdr", schema)
+            schema = self._schemas[noun] = self._writer.add_schema(kind.ROS_TYPE, ENCODING, text)
+        return self._writer.add_channel(channel_name(noun, owner), "cdr", schema)
 
 
 def _open_new(path: Path, part_path: Path) -> BinaryIO:

@@ -2,13 +2,12 @@
 
 import json
 
-from groundstation.cli.vehicle_rows import LABELS, rows_of
-
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.messages import FixAccount
 from groundstation.parts.stars.messages import StarFix
-from groundstation.rig.read import load_rig
+from groundstation.parts.table import installed_tables
+from groundstation.rig.read import parse_rig
 from groundstation.watch.monitor import Monitor
 from groundstation.watch.report import write_report
 
@@ -36,19 +35,23 @@ def test_each_fix_is_accounted_for_even_if_its_packets_never_come(fly):
 
 def test_accounts_are_shown_and_reported(fly, tmp_path):
     flight = fly(WRONG).run(7.0)
-    monitor, topic = Monitor(("alpha",)), FixAccount.TOPIC
+    monitor, topic = Monitor(installed_tables(), ("alpha",)), FixAccount.TOPIC
     for number, account in enumerate(flight.of(FixAccount)):
-        monitor.take(Delivered(Envelope(topic, "alpha", number, 7_000_000_000), account), 7_000_000_000)
-    cells = dict(zip(LABELS, rows_of(monitor.vehicles["alpha"], 7_000_000_000), strict=True))
-    assert "x outside the gate" in cells["  not used"].plain
-    assert "mean" in cells["  innovation, NIS"].plain
+        monitor.take_delivered(
+            Delivered(Envelope(topic, "alpha", number, 7_000_000_000), account), 7_000_000_000
+        )
+    view = monitor.vehicles["alpha"]
+    cells = dict(zip(view.labels(), view.rows(7_000_000_000), strict=True))
+    assert "x outside the gate" in cells["  not used"].text
+    assert "mean" in cells["  innovation, NIS"].text
 
     rig_path = tmp_path / "rig.toml"
     example = (flight.rigs / "drawn_fixes.toml").read_text()
-    rig_path.write_text(example + WRONG + "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n")
-    run_lockstep(load_rig(rig_path), rig_path, tmp_path / "run.mcap", 7.0, 1, lambda *_: None)
+    text = example + WRONG + "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n"
+    rig_path.write_text(text)
+    run_lockstep(parse_rig(text, rig_path), text, rig_path, tmp_path / "run.mcap", 7.0, 1, lambda *_: None)
     written = write_report(tmp_path / "run.mcap", tmp_path / "report", lambda *_: None)
     assert tmp_path / "report" / "fixes.png" in written
-    said = json.loads((tmp_path / "report" / "report.json").read_text())["vehicles"]["alpha"]
-    assert said["fixes"]["outside the gate"] >= 1
-    assert 0.1 < said["fix_nis_mean"] < 12.0
+    reported = json.loads((tmp_path / "report" / "report.json").read_text())["vehicles"]["alpha"]
+    assert reported["fixes"]["outside the gate"] >= 1
+    assert 0.1 < reported["fix_nis_mean"] < 12.0

@@ -11,6 +11,7 @@ from groundstation.cli.recording import app
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.stars.messages import StarFix, StarMatches
+from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.rig.plan import make_node
 from groundstation.rig.read import parse_rig
@@ -35,7 +36,8 @@ def flown(tmp_path_factory):
     text = RIG.read_text().replace("busy_s = 0.6", "busy_s = 0.2") + MORE
     rig_path = path.with_name("rig.toml")
     rig_path.write_text(text.replace("../../calibration", str(RIG.parents[2] / "calibration")))
-    run_lockstep(parse_rig(rig_path.read_text(), rig_path), rig_path, path, 4.5, 3, lambda *_: None)
+    text = rig_path.read_text()
+    run_lockstep(parse_rig(text, rig_path), text, rig_path, path, 4.5, 3, lambda *_: None)
     return path
 
 
@@ -50,16 +52,17 @@ def test_the_pictures_of_refusals_are_recorded_shown_and_replayed(flown, tmp_pat
     assert cv2.imread(str(drawn[0])).shape[1] == 2 * 640
     raw = cv2.imread(str(out / f"{drawn[0].stem}_raw.png"), cv2.IMREAD_UNCHANGED)
     assert raw.shape == (480, 640)
-    monitor = Monitor(("alpha",))
+    tables = installed_tables()
+    monitor = Monitor(tables, ("alpha",))
     with Recording(flown) as recording:
         rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path))
         report = ReplayRunner(recording, lambda key: make_node(rig, key), ["alpha/star_tracker"]).run()
         assert report.agrees
         refused = 0
-        for message in recording.messages():
-            monitor.take(Delivered(message.envelope, message.payload), message.log_ns)
+        for message in recording.messages(tables.payloads.values()):
+            monitor.take_delivered(Delivered(message.envelope, message.payload), message.log_ns)
             refused += isinstance(message.payload, StarFix) and not message.payload.fix
-        matches = [row.payload for row in recording.messages() if isinstance(row.payload, StarMatches)]
+        matches = [row.payload for row in recording.messages([StarMatches])]
     assert monitor.vehicles["alpha"].refused == {"no light spots": refused}
     assert matches[0].basis == "state"
     assert len(matches[0].stars) > 10

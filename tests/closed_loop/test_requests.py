@@ -1,22 +1,22 @@
 """Every request is answered, by the one who carries it out, and what makes no sense is refused."""
 
+import json
 import math
 
 import pytest
 
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.declarations.request import ACTIONS, Ack, Request
+from groundstation.declarations.request import Ack
 from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.table import installed_tables
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
 
+ACTIONS = installed_tables().actions
 
-def ask(flight, action, *numbers, vehicle="alpha", request_id=7):
+
+def ask(flight, action, request_id=7, **arguments):
     """Hand in an operator's request now and fly on; its acks."""
-    now_ns = flight.runner.now_ns
-    request = Request(now_ns, vehicle, request_id, "operator", action, numbers)
-    topic = Request.TOPIC
-    flight.runner._publish([Delivered(Envelope(topic, "operator", request_id, now_ns), request)])
+    flight.request(action, json.dumps(arguments) if arguments else "", request_id=request_id)
     flight.run(0.5)
     return [ack for ack in flight.of(Ack) if ack.author == "operator" and ack.request_id == request_id]
 
@@ -24,32 +24,31 @@ def ask(flight, action, *numbers, vehicle="alpha", request_id=7):
 @pytest.mark.parametrize("action", [name for name in ACTIONS if name != "picture"])
 def test_a_known_request_is_answered_once(fly, action):
     flight = fly().run(2.5)
-    numbers = (0.1,) * len(ACTIONS[action].arguments)
-    answers = ask(flight, action, *numbers)
+    answers = ask(flight, action, **{argument.name: 0.1 for argument in ACTIONS[action].arguments})
     assert [(ack.action, ack.accepted, ack.vehicle) for ack in answers] == [(action, True, "alpha")]
 
 
 @pytest.mark.parametrize(
-    ("action", "numbers", "reason"),
+    ("action", "arguments", "reason"),
     [
-        ("picture", (), "there is no star camera"),  # its fixes are drawn
-        ("fire", (), "unknown action 'fire'"),
-        ("go_to", (0.1, 0.2), "found 2 numbers"),
-        ("go_to", (math.nan, 0.0, 0.0), "finite"),
-        ("go_to", (1.95, 0.0, 0.0), "outside the part of the table"),
-        ("arm", (1.0,), "found 1 numbers"),
+        ("picture", {}, "there is no star camera"),  # its fixes are drawn
+        ("fire", {}, "unknown action 'fire'"),
+        ("go_to", {"x_m": 0.1, "y_m": 0.2}, "go_to needs heading_rad"),
+        ("go_to", {"x_m": math.nan, "y_m": 0.0, "heading_rad": 0.0}, "finite"),
+        ("go_to", {"x_m": 1.95, "y_m": 0.0, "heading_rad": 0.0}, "outside the part of the table"),
+        ("arm", {"x_m": 1.0}, "arm has no argument 'x_m'"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_the_reason(fly, action, numbers, reason):
+def test_what_cannot_be_done_is_refused_with_the_reason(fly, action, arguments, reason):
     flight = fly().run(2.5)
-    (ack,) = ask(flight, action, *numbers)
+    (ack,) = ask(flight, action, **arguments)
     assert not ack.accepted
     assert reason in ack.reason
 
 
 def test_a_vehicle_goes_where_it_is_told(fly):
     flight = fly().run(3.0)
-    assert ask(flight, "go_to", -0.1, -0.1, math.radians(30.0))[0].accepted
+    assert ask(flight, "go_to", x_m=-0.1, y_m=-0.1, heading_rad=math.radians(30.0))[0].accepted
     flight.run(15.0)
     truth = flight.of(ReferenceState)[-1]
     assert math.dist(truth.position_table_m, (-0.1, -0.1)) < 0.02

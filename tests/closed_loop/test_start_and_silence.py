@@ -1,4 +1,4 @@
-"""From landed to flying, and what closes the valves when somebody falls silent."""
+"""From landed to flying, and what closes the valves when a node publishes nothing any more."""
 
 import pytest
 
@@ -9,14 +9,14 @@ from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
 from groundstation.runners.make_runner import make_runner
-from groundstation.runners.slot import NodeSlot
+from groundstation.runners.slot import Slot
 
 SILENT_S = 5.0
 
 
 def mute(flight, name):
-    """From SILENT_S on nothing that a node says gets out, as if it had died."""
-    slots = {slot.key: slot for slot in flight.runner._slots}
+    """From SILENT_S on nothing that a node publishes gets out, as if it had died."""
+    slots = {slot.key: slot for slot in flight.runner._step.slots}
     slot = slots[f"alpha/{name}"]
     node = slot.node
 
@@ -26,18 +26,18 @@ def mute(flight, name):
         def start(self, now_ns):
             return node.start(now_ns)
 
-        def vehicles_heard(self, payload):
-            return node.vehicles_heard(payload)
+        def sources(self, payload):
+            return node.sources(payload)
 
         def receive(self, message, now_ns):
-            said = tuple(node.receive(message, now_ns))
-            return said if now_ns < SILENT_S * 1e9 else ()
+            made = tuple(node.receive(message, now_ns))
+            return made if now_ns < SILENT_S * 1e9 else ()
 
         def tick(self, now_ns):
-            said = tuple(node.tick(now_ns))
-            return said if now_ns < SILENT_S * 1e9 else ()
+            made = tuple(node.tick(now_ns))
+            return made if now_ns < SILENT_S * 1e9 else ()
 
-    assert isinstance(slot, NodeSlot)
+    assert isinstance(slot, Slot)
     slot.node = Mute(node.vehicle, node.tick_period_ns)
 
 
@@ -56,7 +56,7 @@ def test_no_valve_opens_before_the_vehicle_is_armed(fly):
     flight = fly().run(4.0)
     armed_s = next(
         now_ns * 1e-9
-        for mode, now_ns in zip(flight.said[VehicleMode], flight.stamps_ns[VehicleMode], strict=True)
+        for mode, now_ns in zip(flight.published[VehicleMode], flight.stamps_ns[VehicleMode], strict=True)
         if mode.armed
     )
     assert not any(status.open_mask for status in flight.of(ValveStatus, stop_s=armed_s))

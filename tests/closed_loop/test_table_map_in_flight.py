@@ -1,26 +1,23 @@
 """A table that is out of level and wavy, with its map and without: what the map is worth in flight."""
 
-import importlib.util
+import importlib
+import json
 import math
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.declarations.request import Request
+from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveDemand
-from groundstation.recording.writer import Recorder
-from groundstation.rig.provenance import recording_info
-from groundstation.rig.read import load_rig
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SURFACE = "tilt_rad = [0.0003, -0.0001]"
@@ -63,9 +60,8 @@ def tour(fly, legs, seed, table_map=None):
     )
     flight = fly(dark, seed=seed, changes=[WAVY, GOES, *table]).run(begin_s)
     for leg in range(legs):
-        request = Request(flight.runner.now_ns, "alpha", leg + 1, "tour", "go_to", POSES[leg])
-        envelope = Envelope(Request.TOPIC, "tour", leg + 1, flight.runner.now_ns)
-        flight.runner._publish([Delivered(envelope, request)])
+        goal = dict(zip(("x_m", "y_m", "heading_rad"), POSES[leg], strict=True))
+        flight.request("go_to", json.dumps(goal), request_id=leg + 1, author="tour")
         flight.run(LEG_S)
     errors = []
     for end in ends:
@@ -98,9 +94,9 @@ def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(
         "hold = { x_m = 0.0, y_m = 0.0, heading_deg = 5.0 }",
     )
     flight = fly(seed=seed, changes=[WAVY, here, table]).run(3.0)
-    (said,) = flight.of(FusionCalibration)
-    assert said.names == ("table.map",)
-    assert said.contents == (path.read_text(),)
+    (calibration,) = flight.of(FusionCalibration)
+    assert calibration.names == ("table.map",)
+    assert calibration.contents == (path.read_text(),)
     pull = TableMap.load(path).acceleration_m_s2(0.0, 0.0)
     first = flight.of(Wrench)[0]
     turn = math.radians(5.0)
@@ -113,22 +109,14 @@ def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(
 
 @pytest.mark.slow
 def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end_nearer(
-    fly, tmp_path, monkeypatch, groundstation
+    fly, tmp_path, monkeypatch
 ):
     seed = 3
-    spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
-    survey_laps = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "survey_laps", survey_laps)
-    spec.loader.exec_module(survey_laps)
-    rig_path, laps, made = (
-        EXAMPLES / "rigs" / "survey_laps.toml",
-        tmp_path / "laps.mcap",
-        tmp_path / "map.toml",
-    )
-    rig = load_rig(rig_path)
-    with Recorder(laps, recording_info(rig, rig_path, seed, None)) as recorder:
-        survey_laps.fly(rig, 240.0, [recorder.record], seed)
-    result = groundstation("calibrate", "table-map", laps, "--out", made)
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    survey_laps, waypoints = (importlib.import_module(name) for name in ("survey_laps", "waypoints"))
+    laps, made = tmp_path / "laps.mcap", tmp_path / "map.toml"
+    waypoints.record(survey_laps.RIG, laps, 240.0, survey_laps.surveys(["alpha"]), seed)
+    result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
     assert result.exit_code == 0, result.output
     without, gas_without, _ = tour(fly, 3, seed)
     with_map, gas_with, _ = tour(fly, 3, seed, made)

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 from groundstation.bus.topics import TOPICS, topic_of
-from groundstation.runtime.node_table import NODES, Weight, build_slots, key_of, make_node, process_of
+from groundstation.rig.plan import make_node
+from groundstation.runners.step import build_slots
+from groundstation.runtime.node_table import NODES, Weight, key_of, process_of
 from groundstation.runtime.ports import ports_of
 
 from groundstation.bus.journal import Journal, JournalWriter

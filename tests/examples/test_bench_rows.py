@@ -3,19 +3,14 @@
 from pathlib import Path
 
 import pytest
-from groundstation.runtime.node_table import build_slots
-from groundstation.runtime.ports import ports_of
 
-from drivers.laboratory import load_laboratory
-from groundstation.bus.journal import JournalWriter
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
 from groundstation.rig.read import load_rig
-from groundstation.runners.lockstep import LockstepRunner
-from groundstation.runners.slot import Sequences
+from groundstation.runners.make_runner import make_runner
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,11 +19,8 @@ ROOT = Path(__file__).parents[2]
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "run.mcap"
     rig = load_rig(ROOT / "examples" / "rigs" / "drawn_fixes.toml")
-    journal, sequences = JournalWriter(), Sequences()
-    slots = build_slots(rig, None, journal, sequences, measure=False)
-    laboratory = load_laboratory("emulator", rig.laboratory.table, 1)
     with Recorder(path, RecordingInfo()) as recorder:
-        runner = LockstepRunner(slots, laboratory, ports_of(rig), [recorder.record], journal, sequences)
+        runner = make_runner(rig, 1, [recorder.record])
         runner.run(4_000_000_000)
         runner.close()
     return path

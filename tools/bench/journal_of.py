@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from groundstation.bus.journal import Journal, Kind, read_entries
+from groundstation.bus.journal import Entry, Journal, Kind, read_entries
 from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recording
 
@@ -10,43 +10,40 @@ Made = dict[int, int]
 """Sequence of an output to the sequence of the input it answered."""
 
 
-def made_from(recording: Recording, node: str, heard: type[Message], said: type[Message]) -> Made:
+def made_from(recording: Recording, node: str, received: type[Message], published: type[Message]) -> Made:
     """Which input of a node led to which output, by sequence number.
 
     Args:
         recording: Its journal is read.
-        node: Key of the node, ``alpha/imu_reader``.
-        heard: Payload class of the input.
-        said: Payload class of the output.
+        node: Key of the node, ``alpha/imu_reader``; both topics are its vehicle's.
+        received: Payload class of the input.
+        published: Payload class of the output.
     """
-    heard_index, said_index = heard.TOPIC.index, said.TOPIC.index
     made: Made = {}
     trigger: int | None = None
-    for kind, topic, sequence in _entries(recording, node):
-        if kind == Kind.OUTPUT:
-            if trigger is not None and topic == said_index:
-                made[sequence] = trigger
-        elif kind == Kind.INPUT and topic == heard_index:
-            trigger = sequence
+    owner = node.partition("/")[0]
+    for entry in _entries(recording, node):
+        if entry.kind == Kind.OUTPUT:
+            if trigger is not None and entry.noun == published.TOPIC.noun:
+                made[entry.sequence] = trigger
+        elif entry.kind == Kind.INPUT and (entry.noun, entry.owner) == (received.TOPIC.noun, owner):
+            trigger = entry.sequence
         else:
             trigger = None
     return made
 
 
-def consumed(recording: Recording, node: str, heard: type[Message]) -> set[int]:
-    """Sequence numbers of the inputs of one class that a node took."""
-    index = heard.TOPIC.index
+def consumed(recording: Recording, node: str, received: type[Message]) -> set[int]:
+    """Sequence numbers of the inputs of one class, of its own vehicle, that a node took."""
+    wanted = received.TOPIC.noun, node.partition("/")[0]
     entries = _entries(recording, node)
-    return {sequence for kind, topic, sequence in entries if kind == Kind.INPUT and topic == index}
+    return {e.sequence for e in entries if e.kind == Kind.INPUT and (e.noun, e.owner) == wanted}
 
 
-def _entries(recording: Recording, node: str) -> Iterator[tuple[int, int, int]]:
-    """Kind, row of the topic and sequence of each entry of one node, in order."""
-    for message in recording.messages([Journal.TOPIC]):
+def _entries(recording: Recording, node: str) -> Iterator[Entry]:
+    """Entries of one node, in order."""
+    for message in recording.messages([Journal]):
         payload = message.payload
         assert isinstance(payload, Journal)
         if node in payload.names:
-            entries = read_entries(payload.entries)
-            own = entries[entries["node"] == payload.names.index(node)]
-            columns = (own[name].tolist() for name in ("kind", "topic", "sequence"))
-            yield from zip(*columns, strict=True)
+            yield from (entry for entry in read_entries(payload) if entry.node == node)

@@ -79,7 +79,7 @@ def _fly(bench: Bench, path: Path, duration_s: float) -> None:
 
 
 def _messages(recording: Recording, kind: type[Message], vehicle: str) -> Iterator[Recorded]:
-    return recording.messages([kind.TOPIC], [vehicle])
+    return recording.messages([kind], [vehicle])
 
 
 def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:

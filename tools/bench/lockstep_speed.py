@@ -1,9 +1,9 @@
 """Seconds of flight per second of CPU in lockstep: nodes, runner and emulator, with and without recording."""
 
-from groundstation.runners.lockstep_run import make_runner, run_lockstep
-
 from bench.rows import RIGS, Bench, CpuTime, Row
-from groundstation.rig.read import load_rig
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.rig.read import load_rig, read_text
+from groundstation.runners.make_runner import make_runner
 
 CASES = (
     ("fixes drawn from truth", "drawn_fixes.toml", 120.0, 40.0),
@@ -41,6 +41,6 @@ def _recorded(bench: Bench, title: str, name: str, flown_s: float) -> Row:
         bench.say(f"{title}, recorded: {text}")
 
     with CpuTime() as cpu:
-        run_lockstep(load_rig(rig), rig, path, flown_s, 1, progress)
+        run_lockstep(load_rig(rig), read_text(rig), rig, path, flown_s, 1, progress)
     measured = f"{flown_s / cpu.seconds:.1f}x ({bench.in_units(cpu.seconds / flown_s)} per second flown)"
     return Row(f"{title}, recorded", "", measured, None)

@@ -10,9 +10,6 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import make_node
-
 from bench.limits import at_most
 from bench.rows import RIGS, Bench, Row
 from groundstation.bus.envelope import Delivered
@@ -20,9 +17,12 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Scope
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
-from groundstation.rig.read import load_rig, parse_rig
+from groundstation.rig.plan import make_node
+from groundstation.rig.read import load_rig, parse_rig, read_text
 from groundstation.runners.replay import ReplayRunner
 
 ORIGINAL = "alpha"
@@ -77,7 +77,7 @@ def fly(folder: Path, averaging: int, flown_s: float) -> Path:
     text = text.replace("baud = 250000", f"baud = 250000\naveraging = {averaging}")
     rig, path = folder / f"{averaging}.toml", folder / f"{averaging}.mcap"
     rig.write_text(text)
-    run_lockstep(load_rig(rig), rig, path, flown_s, 1, lambda _text, _done: None)
+    run_lockstep(load_rig(rig), read_text(rig), rig, path, flown_s, 1, lambda _text, _done: None)
     return path
 
 
@@ -85,13 +85,13 @@ def multiply(source: Path, target: Path, count: int) -> list[str]:
     """Write a recording of one mock-up again under ``count`` names; return the names."""
     names = [f"mock_up_{i:02d}" for i in range(count)]
     with Recording(source) as recording, Recorder(target, recording.info) as recorder:
-        for message in recording.messages():
+        for message in recording.messages(installed_tables().payloads.values()):
             envelope, payload = message.envelope, message.payload
             if envelope.topic.scope is Scope.RIG:
                 recorder.record(Delivered(envelope, payload), message.log_ns)
                 continue
             for name in names:
-                renamed = envelope._replace(vehicle=_renamed(envelope.vehicle, name))
+                renamed = envelope._replace(owner=_renamed(envelope.owner, name))
                 recorder.record(Delivered(renamed, _of(payload, name)), message.log_ns)
     return names
 

@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
-from groundstation.runners.lockstep_run import run_lockstep
-
 from bench.rows import RIGS, Bench, CpuTime, Row
 from drivers.imu_block.protocol import FrameParser, ImuFrame, encode_v1
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.recording.reader import Recording
-from groundstation.rig.read import load_rig
+from groundstation.rig.read import load_rig, read_text
 
 STREAM_HZ = 1000.0
 LIMIT = 100.0
@@ -20,10 +19,10 @@ FTDI_BYTES = 62
 def recorded_chunks(folder: Path) -> list[bytes]:
     """Every read of the serial port of a lockstep flight, as recorded."""
     path, rig = folder / "parser.mcap", RIGS / "drawn_fixes.toml"
-    run_lockstep(load_rig(rig), rig, path, RECORDED_S, 1, lambda _text, _done: None)
+    run_lockstep(load_rig(rig), read_text(rig), rig, path, RECORDED_S, 1, lambda _text, _done: None)
     with Recording(path) as recording:
-        found = [message.payload for message in recording.messages([ImuBytes.TOPIC])]
-    return [said.data for said in found if isinstance(said, ImuBytes)]
+        found = [message.payload for message in recording.messages([ImuBytes])]
+    return [chunk.data for chunk in found if isinstance(chunk, ImuBytes)]
 
 
 def measure(bench: Bench) -> list[Row]:

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from groundstation.runners.lockstep_run import run_lockstep
 
 from bench.rows import RIGS, Bench, Row
+from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
-from groundstation.rig.read import load_rig
-from groundstation.watch.report import summarise
-from groundstation.watch.tracks import read_tracks
+from groundstation.rig.read import load_rig, read_text
+from groundstation.watch.report import summarise, wanted
 
 FLOWN_S = 120.0
 
@@ -51,11 +51,13 @@ def _fly(bench: Bench, condition: Condition, seed: int) -> tuple[float, float]:
         del done
         bench.say(f"station keeping, {condition.what}, seed {seed} of {bench.seeds}: {text}")
 
-    run_lockstep(load_rig(rig), rig, path, FLOWN_S, seed, progress)
+    run_lockstep(load_rig(rig), read_text(rig), rig, path, FLOWN_S, seed, progress)
     with Recording(path) as recording:
-        said = summarise(read_tracks(recording)["alpha"])
+        tables = installed_tables()
+        reports = summarise(tables, recording.delivered(wanted(tables)), recording.start_ns)
     path.unlink()
-    return said["station_position_rms_mm"], said["station_heading_rms_deg"]
+    numbers = reports["alpha"].numbers
+    return numbers["station_position_rms_mm"], numbers["station_heading_rms_deg"]
 
 
 def _row(what: str, rms: np.ndarray, limit: float, unit: str) -> Row:

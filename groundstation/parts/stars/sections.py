@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
-from groundstation.star_tracking.stamp_delay import read_delay
+from groundstation.star_tracking.stamp_delay import parse_delay
 
 
 class StarCameraSection(Section):
@@ -37,7 +37,7 @@ class StarCameraSection(Section):
         """From the middle of the exposure to the picture's stamp, and its standard deviation, s."""
         if self.delay_file is None:
             return self.delay_s, self.delay_sigma_s
-        found = self.delay_file.value(read_delay)
+        found = self.delay_file.value(parse_delay)
         return found.delay_s, found.sigma_s
 
 

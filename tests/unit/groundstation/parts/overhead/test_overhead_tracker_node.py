@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from groundstation.runtime.node_table import NODES, check_rig, key_of, make_node
+from groundstation.rig.plan import make_node
+from groundstation.runtime.node_table import NODES, check_rig, key_of
 
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
