@@ -72,7 +72,15 @@ def _by_name(what: str, rows: Iterable[tuple[str, T, Part | None]]) -> dict[str,
     owners: dict[str, Part | None] = {}
     for name, row, part in rows:
         if name in found:
-            first, second = (owner.name if owner else "of the runners" for owner in (owners[name], part))
-            raise PartError(f"the parts {first!r} and {second!r} both declare a {what} named {name!r}")
+            raise PartError(_complaint(what, name, owners[name], part))
         found[name], owners[name] = row, part
     return found
+
+
+def _complaint(what: str, name: str, first: Part | None, second: Part | None) -> str:
+    if first is None or second is None:
+        part = first or second
+        return f"the part {'' if part is None else part.name!r} declares the {what} {name!r}, which is the runners' own"
+    if first is second:
+        return f"the part {first.name!r} declares the {what} {name!r} twice"
+    return f"the parts {first.name!r} and {second.name!r} both declare the {what} {name!r}"

@@ -59,7 +59,7 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
     Args:
         text: Of the file.
         path: Where it stands: relative paths inside start at its folder.
-        files: What the files that it names hold; None, and files that are not among them, read from disk.
+        files: What the files that it names hold; None reads them from disk.
         tables: Of the parts that its keys belong to; those installed by default.
 
     Raises:
@@ -73,9 +73,20 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
 
 
 def build_rig(
-    content: dict[str, Any], path: Path, files: RigFiles | None = None, tables: Tables | None = None
+    content: dict[str, Any],
+    path: Path,
+    files: RigFiles | None = None,
+    tables: Tables | None = None,
+    known: RigFiles | None = None,
 ) -> Rig:
     """Make a rig of the keys of its file.
+
+    Args:
+        content: The keys.
+        path: Of the file.
+        files: What the files that it names hold, all of them; None reads them from disk.
+        tables: Of the parts that its keys belong to; those installed by default.
+        known: What some of them hold: these are not read again.
 
     Raises:
         RigError: One sentence with file and key.
@@ -85,7 +96,7 @@ def build_rig(
         folder = {"folder": str(path.parent.resolve())}
         content = {**content, "laboratory": {**content["laboratory"], **folder}}
     try:
-        rig = model.model_validate(content, context={"read_file": _Reader(path.parent, files)})
+        rig = model.model_validate(content, context={"read_file": _Reader(path.parent, files, known or {})})
         _check_vehicles(rig)
         for part in model.tables.parts.values():
             part.check(rig)
@@ -144,9 +155,10 @@ def source_of(rig: Rig) -> Source:
 class _Reader:
     """Reads each file once, however many keys name it."""
 
-    def __init__(self, folder: Path, files: RigFiles | None) -> None:
+    def __init__(self, folder: Path, files: RigFiles | None, known: RigFiles) -> None:
         self._folder = folder
         self._given = files
+        self._known = known
         self._read: dict[Path, RigFile] = {}
 
     def __call__(self, name: str) -> RigFile:
@@ -157,10 +169,13 @@ class _Reader:
         return found
 
     def _bytes(self, path: Path) -> bytes:
+        name = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
         if self._given is not None:
-            given = self._given.get(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
-            if given is not None:
-                return given
+            if name not in self._given:
+                raise CalibrationFileError(f"{path}: was not among the files of the run.")
+            return self._given[name]
+        if name in self._known:
+            return self._known[name]
         try:
             return path.read_bytes()
         except OSError as error:

@@ -24,7 +24,7 @@ def varied(rig: Rig, changes: Mapping[str, object]) -> Rig:
     content = deepcopy(source.content)
     for key, value in changes.items():
         _set(content, key, value)
-    return build_rig(content, source.path, bytes_of(rig), type(rig).tables)
+    return build_rig(content, source.path, tables=type(rig).tables, known=bytes_of(rig))
 
 
 def _set(content: dict[str, Any], key: str, value: object) -> None:

@@ -86,7 +86,7 @@ def test_what_a_part_declares_is_its_own(part):
     makers = {kind for row in part.nodes for kind in row.node_class().outputs} | {
         port.kind.reads for port in part.ports
     }
-    shared = {"operation"}
+    shared = {"operation", "reference"}  # health and answers; a reference may come from motion capture
     for kind in makers:
         assert TABLES.owner(kind) in {part.name, *shared}, kind.__name__
     of_runners = {Latency, Diagnostics, Request}
@@ -108,8 +108,9 @@ def test_a_topic_of_a_vehicle_is_published_by_one_kind_of_node():
         for kind, found in publishers.items()
         if len(found) > 1 and kind.TOPIC.scope is Scope.VEHICLE
     }
-    # a rig has star fixes of its own camera or of a stream, never both; calibrations name their file
-    assert several <= {"StarFix", "CalibrationInUse"}
+    # a rig has star fixes of its own camera or of a stream, never both; likewise its reference;
+    # calibrations name their file
+    assert several <= {"StarFix", "CalibrationInUse", "ReferenceState"}
 
 
 def test_a_fix_source_makes_fixes():

@@ -41,6 +41,7 @@ UNIT = re.compile(r"_(s|ms|ns|m|m_s|m_s2|rad|rad_s|rad_s2|kg|n|nm|pa|c|k|px|px2|
 # what has no unit, or one per element which its docstring names (so do _std and _cov)
 WITHOUT_UNIT = {
     "elongation", "covariance", "std", "innovation", "difference", "mean_difference", "nis", "mean_nis",
+    "quaternion_xyzw",
 }  # fmt: skip
 
 

@@ -65,12 +65,15 @@ SOURCE = FixSource("heart", PoseFix, lambda rig, vehicle: True, lambda rig, vehi
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ([part(), part()], "two parts declare a part named 'pulse'"),
-        ([part(topics=(Beat,)), part("b", topics=(OtherBeat,))], "two parts declare a topic named 'beat'"),
-        ([part(topics=(Beat, Beat))], "two parts declare a topic named 'beat'"),
-        ([part(nodes=(row(),)), part("b", nodes=(row(),))], "two parts declare a node named 'heart'"),
-        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "two parts declare a action named 'skip'"),
-        ([part(fix_sources=(SOURCE, SOURCE))], "two parts declare a fix source named 'heart'"),
+        ([part(), part()], "the parts 'pulse' and 'pulse' both declare the part 'pulse'"),
+        (
+            [part(topics=(Beat,)), part("b", topics=(OtherBeat,))],
+            "the parts 'pulse' and 'b' both declare the topic 'beat'",
+        ),
+        ([part(topics=(Beat, Beat))], "the part 'pulse' declares the topic 'beat' twice"),
+        ([part(nodes=(row(),)), part("b", nodes=(row(),))], "the parts 'pulse' and 'b' both declare the node 'heart'"),
+        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "the part 'pulse' declares the action 'skip' twice"),
+        ([part(fix_sources=(SOURCE, SOURCE))], "the part 'pulse' declares the fix source 'heart' twice"),
         ([part(actions=(ACTION,))], "action 'skip' is answered by 'heart', which no part declares"),
         (
             [part(ports=(PortRow("heart", Port, lambda rig, vehicle: None),))],
@@ -85,7 +88,7 @@ def test_what_does_not_fit_is_refused_by_name(parts, sentence):
 
 
 def test_a_topic_of_the_runners_cannot_be_declared_again():
-    with pytest.raises(PartError, match="two parts declare a topic named 'beat'"):
+    with pytest.raises(PartError, match="'pulse' declares the topic 'beat', which is the runners' own"):
         Tables([part(topics=(OtherBeat,))], topics=(Beat,))
 
 
