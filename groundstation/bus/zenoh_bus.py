@@ -67,7 +67,7 @@ def split_key(key: str) -> tuple[str, str]:
 
 
 def _direct(receive: Callable[[T], None]) -> "Callback[T]":
-    """Let Zenoh's own thread call: a thread for each subscriber costs memory, and a switch for each message."""
+    """Let Zenoh's own thread call: a thread for each subscriber costs memory and a switch per message."""
     return Callback(receive, indirect=False)
 
 

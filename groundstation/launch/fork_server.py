@@ -5,38 +5,33 @@ and started as an interpreter of its own where it has (a server that was killed 
 What it forks becomes a child of the launcher: the server forks twice, and the launcher is the subreaper of
 what descends from it. So the launcher learns at once how a process ended, and processes outlive the server.
 
-The standard library's fork server (``multiprocessing``) was tried: when its server dies, its processes count
-as ended with code 255, and a second helper process, the resource tracker, costs 8 MB.
+The standard library's fork server (``multiprocessing``) does not do: when its server dies, its processes
+count as ended with code 255 though they live; and it brings another process, the resource tracker.
 """
 
 import contextlib
 import ctypes
 import gc
-import importlib
 import os
 import pickle
 import select
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO, NoReturn
+from typing import BinaryIO
 
 from groundstation.declarations.errors import GroundStationError
+from groundstation.launch import forking
+from groundstation.launch.forking import LOADED, PID, serve
 
 ANSWER_WITHIN_S = 10.0
 """A server that still loads what it needs answers late; one that takes longer is given up."""
 
 _SET_CHILD_SUBREAPER = 36  # <sys/prctl.h>
-_ARENA_MAX = -8  # <malloc.h>
-_LOADED = b"loaded"
-_PID = struct.Struct("<i")
-_ARGUMENTS = 45  # field of /proc/self/stat behind the name: where the command line begins in memory
-_KEPT_OPEN = 3  # stdin, stdout, stderr
 
 
 class ForkedProcess:
@@ -119,7 +114,7 @@ class ForkServer:
         if not self._is_loaded and self._socket is not None:
             self._is_loaded = bool(select.select([self._socket], [], [], 0.0)[0])
             if self._is_loaded:
-                self._socket.recv(len(_LOADED))
+                self._socket.recv(len(LOADED))
         return self._is_loaded
 
     def start(self) -> None:
@@ -204,12 +199,12 @@ class ForkServer:
         if self._socket is None:
             raise ConnectionError("it was not started")
         if not self._is_loaded:
-            self._is_loaded = self._socket.recv(len(_LOADED)) == _LOADED
+            self._is_loaded = self._socket.recv(len(LOADED)) == LOADED
         socket.send_fds(self._socket, [b"f"], descriptors)
-        answer = self._socket.recv(_PID.size)
-        if len(answer) != _PID.size:
+        answer = self._socket.recv(PID.size)
+        if len(answer) != PID.size:
             raise ConnectionError("it has ended")
-        number: int = _PID.unpack(answer)[0]
+        number: int = PID.unpack(answer)[0]
         return number
 
     def _has_ended(self) -> bool:
@@ -224,7 +219,7 @@ class ForkServer:
 
     def _start_interpreter(self, descriptor: int) -> None:
         self._popen = subprocess.Popen(
-            [sys.executable, "-m", __spec__.name, str(descriptor), *self._modules],
+            [sys.executable, "-m", forking.__name__, str(descriptor), *self._modules],
             stdin=subprocess.DEVNULL,
             pass_fds=[descriptor],
             start_new_session=True,
@@ -244,7 +239,7 @@ class ForkServer:
             code = 1
             try:
                 os.setsid()
-                _serve(theirs, self._modules)
+                serve(theirs, self._modules)
                 code = 0
             except BaseException:  # whatever it is, it must not return into the launcher's code
                 traceback.print_exc()
@@ -259,109 +254,6 @@ def _adopt_orphans() -> None:
         raise GroundStationError("processes can be started on Linux only")
 
 
-def share_one_arena() -> None:
-    """Let all threads of a process allocate from one place: one for each costs a megabyte a process."""
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc has it
-    if mallopt is not None:
-        mallopt(_ARENA_MAX, 1)
-
-
 def _has_threads() -> bool:
     """Whether this process has threads, be it of Python or of a library."""
     return len(list(Path("/proc/self/task").iterdir())) > 1
-
-
-def _serve(requests: socket.socket, modules: Iterable[str]) -> None:
-    """Load modules, then fork what is asked for, until the other end is closed."""
-    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP):
-        signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _close_but(requests.fileno())
-    nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)
-    os.dup2(nothing, 1)
-    os.close(nothing)
-    _set_name("fork_server")
-    share_one_arena()
-    for module in modules:
-        importlib.import_module(module)
-    gc.collect()
-    gc.freeze()
-    requests.send(_LOADED)
-    while True:
-        asked, descriptors, _, _ = socket.recv_fds(requests, 1, 3)
-        if not asked:
-            return
-        answer_ours, answer_theirs = os.pipe()
-        between = os.fork()
-        if between == 0:
-            _fork_again(descriptors, answer_theirs)
-        for descriptor in (*descriptors, answer_theirs):
-            os.close(descriptor)
-        os.waitpid(between, 0)  # from now on the new process is the launcher's
-        answer = os.read(answer_ours, _PID.size)
-        os.close(answer_ours)
-        requests.send(answer or b"-")
-
-
-def _fork_again(descriptors: list[int], answer: int) -> NoReturn:
-    """Fork the process that was asked for, answer its number and end, so that it becomes an orphan."""
-    code = 1
-    try:
-        pid = os.fork()
-        if pid:
-            os.write(answer, _PID.pack(pid))
-        else:
-            _become(*descriptors)
-        code = 0
-    except SystemExit as done:
-        code = done.code if isinstance(done.code, int) else 1
-    except BaseException:  # whatever it is, it must not return into the server's loop
-        traceback.print_exc()
-    finally:
-        os._exit(code)
-
-
-def _become(request: int, stdin: int, stderr: int) -> None:
-    """Be the process that was asked for."""
-    os.setsid()  # Ctrl-C reaches the launcher alone
-    os.dup2(stdin, 0)
-    os.dup2(stderr, 1)
-    os.dup2(stderr, 2)
-    pickled = Path(f"/proc/self/fd/{request}").read_bytes()  # by this name it is read from its beginning
-    _close_but(None)
-    sys.stdin = open(0, closefd=False)  # noqa: SIM115 the old one may have read ahead
-    sys.stdout = sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115 open to the end
-    for number in (signal.SIGHUP, signal.SIGTSTP):
-        signal.signal(number, signal.SIG_DFL)
-    name, target, arguments = pickle.loads(pickled)
-    _set_name(name)
-    target(*arguments)
-    sys.stderr.flush()
-
-
-def _close_but(kept: int | None) -> None:
-    """Close what was open before the fork: another process's stdin must end with the launcher alone."""
-    for entry in list(os.scandir("/proc/self/fd")):
-        descriptor = int(entry.name)
-        if descriptor >= _KEPT_OPEN and descriptor != kept:
-            with contextlib.suppress(OSError):  # that of the listing itself
-                os.close(descriptor)
-
-
-def _set_name(name: str) -> None:
-    """The name that ``ps`` shows: 15 characters of it as the command, the whole as the command line."""
-    Path("/proc/self/comm").write_text(name)
-    begin, end = map(int, Path("/proc/self/stat").read_text().rpartition(")")[2].split()[_ARGUMENTS:][:2])
-    room = end - begin
-    if room > 1:
-        ctypes.memmove(begin, f"groundstation {name}".encode()[: room - 1].ljust(room, b"\0"), room)
-
-
-def main() -> None:
-    """Serve as an interpreter of its own: number of the socket, then the modules to load."""
-    _serve(socket.socket(fileno=int(sys.argv[1])), sys.argv[2:])
-
-
-if __name__ == "__main__":
-    main()

@@ -23,7 +23,8 @@ from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.rig import Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
-from groundstation.launch.fork_server import ForkServer, share_one_arena
+from groundstation.launch.fork_server import ForkServer
+from groundstation.launch.forking import share_one_arena
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
