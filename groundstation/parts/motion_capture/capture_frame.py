@@ -68,7 +68,7 @@ class CaptureFrame:
         Raises:
             ValueError: The quaternion is not of length 1.
         """
-        if abs(math.hypot(*quaternion_xyzw) - 1.0) > 1e-3:
+        if not abs(math.hypot(*quaternion_xyzw) - 1.0) <= 1e-3:  # NaN too
             raise ValueError(f"a quaternion of length {math.hypot(*quaternion_xyzw):.3g}")
         turned = self._table_from_capture * Rotation.from_quat(quaternion_xyzw) * _UP[body_up].inv()
         axes = turned.as_matrix()

@@ -11,7 +11,7 @@ from groundstation.declarations.node import Node
 from groundstation.parts.stars.messages import StarImage, StarMatches, StarPicture
 
 MEMORY_NS = 3_000_000_000
-MOST_FRAMES = 48
+MOST_FRAMES = 16  # a second: the star tracker answers within less, and frames are large
 _FASTEST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
