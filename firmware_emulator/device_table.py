@@ -48,14 +48,16 @@ def device_kinds() -> tuple[DeviceKind[Any], ...]:
     """
     kinds = list(OWN)
     for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
+        package = point.dist.name if point.dist is not None else point.module
+        where = f"device {point.name!r} of the package {package} ({point.value})"
         try:
             kind = point.load()
-        except (ImportError, AttributeError) as error:
-            raise NotFound(f"device {point.name!r} ({point.value}) cannot be loaded: {error}") from error
+        except Exception as error:  # whatever a package of somebody else raises: it is named, once
+            raise NotFound(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
         if not isinstance(kind, DeviceKind):
-            raise NotFound(f"device {point.name!r} ({point.value}) is a {type(kind).__name__}, no DeviceKind")
+            raise NotFound(f"{where} is a {type(kind).__name__}, no DeviceKind")
         if kind.name in {other.name for other in kinds}:
-            raise NotFound(f"device {point.name!r} ({point.value}): there is another kind {kind.name!r}")
+            raise NotFound(f"{where}: there is another kind {kind.name!r}")
         kinds.append(kind)
     return tuple(kinds)
 

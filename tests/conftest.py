@@ -1,5 +1,7 @@
 """What holds for all tests: hypothesis draws the same examples everywhere and measures no time."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,6 +30,22 @@ def groundstation() -> Callable[..., Result]:
         return result
 
     return call
+
+
+@pytest.fixture(scope="session")
+def own_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder into which ``examples/own_package`` was installed, to be put on PYTHONPATH."""
+    folder = tmp_path_factory.mktemp("own_package") / "installed"
+    source = Path(__file__).parents[1] / "examples" / "own_package"
+    words = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pip", *words, "--target", str(folder), str(source)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

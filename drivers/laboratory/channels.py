@@ -96,10 +96,13 @@ def load_laboratory(name: str, config: Mapping[str, object], seed: int) -> Labor
     if name not in offered:
         known = ", ".join(sorted(offered)) or "none"
         raise NotFound(f"no laboratory named {name!r} is installed (installed: {known})")
+    point = offered[name]
     try:
-        factory = offered[name].load()
-    except (ImportError, AttributeError) as error:
-        raise NotFound(f"laboratory {name!r} ({offered[name].value}) cannot be loaded: {error}") from error
+        factory = point.load()
+    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+        raise NotFound(
+            f"laboratory {name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}"
+        ) from error
     laboratory = factory(config, seed)
     if not isinstance(laboratory, Laboratory):
         raise TypeError(f"laboratory {name!r} made a {type(laboratory).__name__}, which is no Laboratory")

@@ -40,7 +40,8 @@ def installed_tables() -> Tables:
 
 
 def _load(point: EntryPoint) -> Part:
-    where = f"the part {point.name!r} ({point.value})"
+    package = point.dist.name if point.dist is not None else point.module
+    where = f"the part {point.name!r} of the package {package} ({point.value})"
     try:
         part = point.load()
     except Exception as error:  # whatever a package of somebody else raises: it is named, once

@@ -84,7 +84,13 @@ def install(monkeypatch):
 
     def offer(**kinds):
         points = [
-            SimpleNamespace(name=name, value=f"somewhere:{name}", load=lambda kind=kind: kind)
+            SimpleNamespace(
+                name=name,
+                value=f"somewhere:{name}",
+                module="somewhere",
+                dist=None,
+                load=lambda kind=kind: kind,
+            )
             for name, kind in kinds.items()
         ]
         monkeypatch.setattr(device_table, "entry_points", lambda group: points)
@@ -226,10 +232,10 @@ def test_a_device_that_cannot_be_loaded_is_named(install, monkeypatch):
     def broken():
         raise ImportError("no module named gone")
 
-    points = [SimpleNamespace(name="gone", value="gone:GONE", load=broken)]
+    points = [SimpleNamespace(name="gone", value="gone:GONE", module="gone", dist=None, load=broken)]
     monkeypatch.setattr(device_table, "entry_points", lambda group: points)
     device_kinds.cache_clear()
-    with pytest.raises(NotFound, match=r"'gone' \(gone:GONE\) cannot be loaded"):
+    with pytest.raises(NotFound, match=r"'gone' of the package gone \(gone:GONE\) cannot be loaded"):
         EmulatedLaboratory(scenario())
     device_kinds.cache_clear()
 
