@@ -109,7 +109,7 @@ def test_a_topic_of_a_vehicle_is_published_by_one_kind_of_node():
         for kind, found in publishers.items()
         if len(found) > 1 and kind.TOPIC.scope is Scope.VEHICLE
     }
-    # a rig has star fixes of its own camera or of a stream, never both; calibrations name their file; a rig refuses two references
+    # a rig has star fixes of its camera or of a stream, and one reference, never two; files have names
     assert several <= {"StarFix", "CalibrationInUse", "ReferenceState"}
 
 
