@@ -20,6 +20,7 @@ from groundstation.declarations.section import Section
 from groundstation.declarations.topic import Scope
 from groundstation.declarations.view import Newest
 from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.table import installed_tables
 from groundstation.rig.read import build_rig, load_rig
 
@@ -86,9 +87,9 @@ def test_what_a_part_declares_is_its_own(part):
     makers = {kind for row in part.nodes for kind in row.node_class().outputs} | {
         port.kind.reads for port in part.ports
     }
-    shared = {"operation", "reference"}  # health and answers; a reference may come from motion capture
+    shared = {ReferenceState, *PARTS["operation"].topics}  # a reference may come from several systems
     for kind in makers:
-        assert TABLES.owner(kind) in {part.name, *shared}, kind.__name__
+        assert TABLES.owner(kind) == part.name or kind in shared, kind.__name__
     of_runners = {Latency, Diagnostics, Request}
     everywhere = {kind for row in TABLES.nodes.values() for kind in row.node_class().outputs}
     everywhere |= {port.kind.reads for port in TABLES.ports}
@@ -108,8 +109,7 @@ def test_a_topic_of_a_vehicle_is_published_by_one_kind_of_node():
         for kind, found in publishers.items()
         if len(found) > 1 and kind.TOPIC.scope is Scope.VEHICLE
     }
-    # a rig has star fixes of its own camera or of a stream, never both; likewise its reference;
-    # calibrations name their file
+    # a rig has star fixes of its camera or of a stream, and one reference, never two; files have names
     assert several <= {"StarFix", "CalibrationInUse", "ReferenceState"}
 
 
