@@ -4,7 +4,7 @@ STAMP := .venv/.installed
 CORE := .venv/.core
 PEERS := .venv/.peers
 
-.PHONY: run test test-all check bench clean
+.PHONY: run test test-all check bench clean zig
 .DEFAULT_GOAL := help
 
 help:
@@ -18,10 +18,15 @@ $(STAMP): pyproject.toml tools/requirements.lock
 	@echo "Creating .venv (once) ..."
 	@$(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements.lock
+	@command -v $(firstword $(CC)) > /dev/null || $(MAKE) --no-print-directory zig
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 
-$(CORE): $(STAMP) groundstation/core/build.py $(wildcard groundstation/core/*.[ch])
+zig: # the C compiler of a machine that has none
+	@echo "There is no C compiler: installing ziglang (once) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements-zig.lock
+
+$(CORE): $(STAMP) groundstation/core/build.py groundstation/core/sources.py $(wildcard groundstation/core/*.[ch])
 	@$(BIN)/python tools/build_core.py
 	@touch $(CORE)
 
@@ -51,4 +56,4 @@ bench: $(CORE) $(PEERS)
 	@$(BIN)/python tools/bench.py
 
 clean:
-	@rm -rf groundstation/core/_core.so .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	@rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

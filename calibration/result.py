@@ -6,8 +6,10 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
+
+from groundstation.files.toml_file import Value, toml_lines, toml_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,56 +43,59 @@ class CalibrationResult:
 
     def to_toml(self) -> str:
         """Return the result as TOML; the names are stable, other programs read them."""
-        lines = [
-            f"# {self.title}",
-            "",
-            f"made_utc = {self.provenance.made_utc.isoformat(timespec='seconds')}",
-        ]
-        lines += [f"recording = {_text(self.provenance.recording)}"]
-        lines += [f"recording_sha256 = {_text(self.provenance.recording_sha256)}"]
-        lines += [f"{name} = {_value(value)}" for name, value in self.notes.items()]
+        origin: dict[str, Value] = {
+            "made_utc": self.provenance.made_utc,
+            "recording": self.provenance.recording,
+            "recording_sha256": self.provenance.recording_sha256,
+        }
+        lines = [f"# {self.title}", "", *toml_lines({**origin, **self.notes})]
         for table, quantities in (("", self.quantities), ("residual.", self.residual)):
             for name, quantity in quantities.items():
-                lines += ["", f"[{table}{name}]", f"value = {_number(quantity.value)}"]
-                if not math.isnan(quantity.std):
-                    lines.append(f"std = {_number(quantity.std)}")
-                lines.append(f"unit = {_text(quantity.unit)}")
+                std = {} if math.isnan(quantity.std) else {"std": quantity.std}
+                lines += toml_table(table + name, {"value": quantity.value, **std, "unit": quantity.unit})
         return "\n".join(lines) + "\n"
 
 
-def provenance_of(recording: Path, now_utc: datetime) -> Provenance:
-    """Describe a file, or the files of a folder, by name and hash."""
-    files = (
-        sorted(p for p in recording.iterdir() if p.suffix == ".csv") if recording.is_dir() else [recording]
-    )
+def quantity_lines(quantities: Mapping[str, Quantity]) -> list[str]:
+    """Return quantities in words, a line each."""
+    lines = []
+    for name, quantity in quantities.items():
+        spread = "" if math.isnan(quantity.std) else f" ± {quantity.std:.2g}"
+        lines.append(f"{name} = {quantity.value:.6g}{spread} {quantity.unit}")
+    return lines
+
+
+def provenance_of(
+    recording: Path, now_utc: datetime | None = None, files: Sequence[Path] | None = None
+) -> Provenance:
+    """Describe what was read by name and hash.
+
+    Args:
+        recording: A file, or a folder.
+        now_utc: When the result was made; now if None.
+        files: What was read of a folder; its CSV files if None.
+    """
+    if files is None:
+        # a reference is not part of what was measured
+        found = (
+            sorted(p for p in recording.iterdir() if p.suffix == ".csv")
+            if recording.is_dir()
+            else [recording]
+        )
+        files = [file for file in found if file.name != "truth.csv"]
     digest = hashlib.sha256()
     for file in files:
-        if file.name != "truth.csv":  # a reference is not part of what was measured
-            digest.update(file.name.encode())
-            digest.update(file.read_bytes())
-    return Provenance(recording.name, digest.hexdigest(), now_utc)
+        digest.update(file.name.encode())
+        with file.open("rb") as content:
+            while block := content.read(1 << 20):
+                digest.update(block)
+    return Provenance(recording.resolve().name, digest.hexdigest(), now_utc or datetime.now(UTC))
 
 
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return "nan"
-    if math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return repr(float(f"{value:.9g}"))
-
-
-def _text(value: str) -> str:
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
-    return f'"{escaped}"'
-
-
-def _value(value: float | int | str | bool | Sequence[str]) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        return _number(value)
-    if isinstance(value, str):
-        return _text(value)
-    return "[" + ", ".join(_text(item) for item in value) + "]"
+def provenance_of_several(recordings: Sequence[Path]) -> Provenance:
+    """Describe recordings that were used together."""
+    parts = [provenance_of(path) for path in recordings]
+    if len(parts) == 1:
+        return parts[0]
+    digest = hashlib.sha256("".join(part.recording_sha256 for part in parts).encode()).hexdigest()
+    return Provenance(", ".join(part.recording for part in parts), digest, parts[0].made_utc)

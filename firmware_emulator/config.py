@@ -6,12 +6,12 @@ radians. Unknown keys are refused.
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from drivers.valve_bus.protocol import MAX_VEHICLES
-from firmware_emulator.faults import FaultConfig
+from firmware_emulator.failures import FailureConfig
 from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.settings import Fraction, NonNegative, Pair, Positive, Settings
 
@@ -46,33 +46,8 @@ class TableConfig(Settings):
         return self
 
 
-class OverheadConfig(Settings):
-    """The camera over the table that looks down: one for the laboratory."""
-
-    camera: str
-    """Path of the camera file (JSON)."""
-    circles: str
-    """Path of what each mock-up wears (TOML)."""
-    rate_hz: Positive = 10.0
-    exposure_s: Positive = 0.01
-    delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.02
-    """From the middle of the exposure to the host."""
-    delay_jitter_s: NonNegative = 0.001
-    stream: Literal["raw", "mjpeg"] = "raw"
-    """How live pictures are served over HTTP."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
-
-    @model_validator(mode="after")
-    def _exposure_fits_the_rate(self) -> "OverheadConfig":
-        if self.exposure_s * self.rate_hz >= 1.0:
-            raise ValueError(
-                f"exposure_s = {self.exposure_s:g} s is longer than a period of rate_hz = {self.rate_hz:g}"
-            )
-        return self
-
-
 class LaboratoryConfig(Settings):
-    """The whole `[laboratory]` table."""
+    """The `[laboratory]` table, beside the sections of devices (`device_table.read_config`)."""
 
     name: str = "emulator"
     """The entry point that made this laboratory."""
@@ -81,9 +56,10 @@ class LaboratoryConfig(Settings):
     seed: Annotated[int, Field(ge=0)] = 0
     table: TableConfig = TableConfig()
     vehicles: Annotated[tuple[VehicleConfig, ...], Field(min_length=1, max_length=MAX_VEHICLES)]
-    overhead: OverheadConfig | None = None
-    """The camera over the table, if there is one."""
-    faults: tuple[FaultConfig, ...] = ()
+    failures: Annotated[
+        tuple[FailureConfig, ...], Field(validation_alias=AliasChoices("failures", "faults"))
+    ] = ()
+    """What is injected, and when; `faults`, its older name, is still read."""
     bus_bitrate: Positive = 500_000.0
 
     def path(self, path: str) -> str:
@@ -95,9 +71,11 @@ class LaboratoryConfig(Settings):
         names = [vehicle.name for vehicle in self.vehicles]
         if len(set(names)) != len(names):
             raise ValueError(f"vehicles must have different names, got {', '.join(names)}")
-        for fault in self.faults:
-            if fault.vehicle not in names:
-                raise ValueError(f"fault {fault.kind!r} names vehicle {fault.vehicle!r}; there are {names}")
+        for failure in self.failures:
+            if failure.vehicle not in names:
+                raise ValueError(
+                    f"failure {failure.kind!r} names vehicle {failure.vehicle!r}; there are {names}"
+                )
         return self
 
     @model_validator(mode="after")

@@ -2,11 +2,12 @@
 
     python tools/build_core.py
 
-A machine without a C compiler gets one line, and the slower NumPy code.
+A source tree keeps its core in ``build/core``; a wheel gets its own, compiled outside the tree.
 """
 
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,36 +16,55 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 _ROOT = Path(__file__).resolve().parents[1]
 if str(_ROOT) not in sys.path:
     sys.path.insert(0, str(_ROOT))  # the package is being built: nothing of it is installed yet
+sys.dont_write_bytecode = True
 
-from groundstation.core.build import LIBRARY, CoreBuildError, compile_core, is_fresh  # noqa: E402
+from groundstation.core.build import CoreBuildError, compile_core, compiler  # noqa: E402
+from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, is_fresh  # noqa: E402
+
+_ZIG_LOCK = _ROOT / "tools" / "requirements-zig.lock"
 
 
 class CoreBuildHook(BuildHookInterface[Any]):
-    """Compiles the core into the tree, and into the wheel of this platform."""
+    """Compiles the core for an editable install, or into the wheel of this platform."""
 
     PLUGIN_NAME = "custom"
 
+    def dependencies(self) -> list[str]:
+        """What an isolated build needs besides: a compiler, where the machine has none."""
+        try:
+            compiler()
+        except CoreBuildError:
+            return [_ZIG_LOCK.read_text().split()[0]]
+        return []
+
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        if self.target_name != "wheel" or not build():
+        if self.target_name != "wheel":
             return
-        build_data["artifacts"].append(str(LIBRARY.relative_to(_ROOT)))
+        if version == "editable":
+            build()
+            return
+        self._made_in = tempfile.TemporaryDirectory()
+        made = compile_core(Path(self._made_in.name))
+        for name in (LIBRARY, INTERFACE):
+            build_data["force_include"][str(made / name)] = f"groundstation/core/{name}"
         build_data["pure_python"] = False
-        if version != "editable":
-            # Plain C without Python's own interface: one wheel for every Python of this platform.
-            platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-            build_data["tag"] = f"py3-none-{platform}"
+        # Plain C without Python's own interface: one wheel for every Python of this platform.
+        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        build_data["tag"] = f"py3-none-{platform}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        if self.target_name == "wheel" and version != "editable":
+            self._made_in.cleanup()
 
 
-def build() -> bool:
-    """Compile unless fresh; say so when it cannot be done."""
-    try:
-        if not is_fresh():
-            compile_core()
-    except CoreBuildError as error:
-        print(f"The core is not compiled, the slower NumPy code will be used: {error}", file=sys.stderr)
-        return False
-    return True
+def build() -> None:
+    """Compile the core of the source tree unless it is fresh."""
+    if not is_fresh(built_folder()):
+        compile_core(built_folder())
 
 
 if __name__ == "__main__":
-    build()
+    try:
+        build()
+    except CoreBuildError as error:
+        raise SystemExit(f"The core cannot be compiled: {error}") from error

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 Array = NDArray[np.float64]
 
 FLICKER_FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
@@ -57,11 +59,11 @@ def allan_deviation(rate: Array, period_s: float, points_per_decade: int = 10) -
         points_per_decade: averaging times per factor of ten.
 
     Raises:
-        ValueError: fewer than 64 readings.
+        CalibrationRefusedError: fewer than 64 readings.
     """
     n = len(rate)
     if n < 64:
-        raise ValueError(f"an Allan deviation needs at least 64 readings, found {n}")
+        raise CalibrationRefusedError(f"an Allan deviation needs at least 64 readings, found {n}")
     longest = n // (LEAST_PAIRS + 1)
     steps = max(2, round(points_per_decade * math.log10(longest)) + 1)
     factors = np.unique(np.round(np.geomspace(1, longest, steps)).astype(int))

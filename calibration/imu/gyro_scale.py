@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 Array = NDArray[np.float64]
 
 LEAST_TURN_RAD = 2.0 * math.pi
@@ -48,17 +50,17 @@ def gyro_scale(
         null_rad_s: rough null, to unwrap with.
 
     Raises:
-        ValueError: fewer than eight fixes, or less than one turn.
+        CalibrationRefusedError: fewer than eight fixes, or less than one turn.
     """
     inside = (fix_s > end_s[0]) & (fix_s <= end_s[-1]) & np.isfinite(heading_rad)
     t, stars = fix_s[inside], heading_rad[inside]
     if len(t) < 8:
-        raise ValueError(f"at least 8 fixes are needed, found {len(t)}")
+        raise CalibrationRefusedError(f"at least 8 fixes are needed, found {len(t)}")
     path = np.interp(t, end_s, np.cumsum((omega_rad_s - null_rad_s) * span_s))
     elapsed = t - t[0]
     turned = float(np.ptp(path))
     if turned < LEAST_TURN_RAD:
-        raise ValueError(f"a full turn is needed, found {math.degrees(turned):.0f} deg")
+        raise CalibrationRefusedError(f"a full turn is needed, found {math.degrees(turned):.0f} deg")
     off = _unwrapped(stars - path)
     A = np.column_stack([np.ones_like(elapsed), -path, -elapsed])
     used = np.abs(off - np.median(off)) < math.pi / 2

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.imu.zero_offset import packet_sigma
+from calibration.outcome import CalibrationRefusedError
 
 Array = NDArray[np.float64]
 
@@ -32,10 +33,10 @@ def find_rests(
         loudest: (3,) sigma of one packet beyond which the sensors' own noise cannot be; None if unknown.
 
     Raises:
-        ValueError: fewer than eight packets.
+        CalibrationRefusedError: fewer than eight packets.
     """
     if len(t_s) < 8:
-        raise ValueError(f"at least 8 packets are needed, found {len(t_s)}")
+        raise CalibrationRefusedError(f"at least 8 packets are needed, found {len(t_s)}")
     period = float(np.median(np.diff(t_s)))
     size = max(4, round(BLOCK_S / period))
     count = len(t_s) // size

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 Array = NDArray[np.float64]
 
 BLOCK_S = 5.0
@@ -45,16 +47,16 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
         temperature_c: (n,).
 
     Raises:
-        ValueError: no thermometer, too short, or hardly any change of temperature.
+        CalibrationRefusedError: no thermometer, too short, or hardly any change of temperature.
     """
     known = np.isfinite(temperature_c) & np.isfinite(readings).all(axis=1)
     if not known.any():
-        raise ValueError("the recording holds no temperatures")
+        raise CalibrationRefusedError("the recording holds no temperatures")
     t, values, warmth = t_s[known], readings[known], temperature_c[known]
     block = np.floor((t - t[0]) / BLOCK_S).astype(int)
     labels = np.unique(block)
     if len(labels) < 8:
-        raise ValueError(f"at least {8 * BLOCK_S:g} s are needed, found {t[-1] - t[0]:.0f} s")
+        raise CalibrationRefusedError(f"at least {8 * BLOCK_S:g} s are needed, found {t[-1] - t[0]:.0f} s")
     means = np.array([np.median(values[block == k], axis=0) for k in labels])
     # packets averaged per block: their mean is quieter than the median, which only guards against wild ones
     spread = np.array([1.4826 * np.median(np.abs(values[block == k] - m), axis=0)
@@ -68,7 +70,9 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
     when = np.array([t[block == k].mean() for k in labels])
     span = float(np.ptp(heat))
     if span < LEAST_SPAN_C:
-        raise ValueError(f"the temperature changed by {span:.2f} C only; {LEAST_SPAN_C:g} C are needed")
+        raise CalibrationRefusedError(
+            f"the temperature changed by {span:.2f} C only; {LEAST_SPAN_C:g} C are needed"
+        )
     reference = float(heat.mean())
     A = np.column_stack([np.ones_like(heat), heat - reference])
     found, std, left = np.zeros((2, 3)), np.zeros(3), np.zeros_like(means)

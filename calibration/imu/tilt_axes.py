@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 Array = NDArray[np.float64]
 
 G_M_S2 = 9.80665
@@ -90,12 +92,13 @@ def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> Til
         slope_std_m_s2: of the slope that the rests say is known; None if nothing is known of it.
 
     Raises:
-        ValueError: too few rests, one without tilt and heading, or nothing but the offset can be learned.
+        CalibrationRefusedError: too few rests, one without tilt and heading, or nothing but the offset can be
+            learned.
     """
     if len(rests) < LEAST_RESTS:
-        raise ValueError(f"at least {LEAST_RESTS} rests are needed, found {len(rests)}")
+        raise CalibrationRefusedError(f"at least {LEAST_RESTS} rests are needed, found {len(rests)}")
     if any(rest.tilt_rad is None and rest.heading_rad is None for rest in rests):
-        raise ValueError(
+        raise CalibrationRefusedError(
             "a rest on the bare table needs a heading by the stars, or give the tilts of all rests"
         )
     sigma0 = _prior(known_slope_std_m_s2=slope_std_m_s2 or 0.0)
@@ -131,7 +134,7 @@ def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> Til
     result = TiltAxes(x[:2], E, x[6:], covariance, (), r.reshape(-1, 2), 1.0 / w.reshape(-1, 2), chi)
     words = _unknown(result, has_slope=bool(sigma0[6] > 1e-6))
     if not any(result.is_known(k) for k in range(2, 6)) and _combination_std(result, (1, 0, 0, -1)) > 0.03:
-        raise ValueError(
+        raise CalibrationRefusedError(
             "the rests are too alike to tell scale or axes: tilt further (gauge blocks), or turn through "
             "more headings on a table that is tilted by some mrad"
         )

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 Array = NDArray[np.float64]
 
 BLOCK_S = 0.25
@@ -28,7 +30,7 @@ MARGIN_BLOCKS = 1
 CHANNELS = ("omega", "ax", "ay")
 
 
-class NotARest(ValueError):  # noqa: N818 - it is a finding about the recording
+class NotARest(CalibrationRefusedError):  # noqa: N818 - it is a finding about the recording
     """The recording does not hold a rest; the text says what was found."""
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from calibration.outcome import CalibrationRefusedError
 from groundstation.overhead.overhead_camera import OverheadCamera
 
 Array = NDArray[np.float64]
@@ -78,12 +79,12 @@ def calibrate_overhead_pose(
         board_height_m: Thickness of the board.
 
     Raises:
-        ValueError: No view, or one with too few corners.
+        CalibrationRefusedError: No view, or one with too few corners.
     """
     if not views:
-        raise ValueError("the board was found in no picture")
+        raise CalibrationRefusedError("the board was found in no picture")
     if min(len(view.pixel) for view in views) < _MIN_CORNERS:
-        raise ValueError(f"a picture shows fewer than {_MIN_CORNERS} corners of the board")
+        raise CalibrationRefusedError(f"a picture shows fewer than {_MIN_CORNERS} corners of the board")
     priors = np.tile((tape_sigma_m, tape_sigma_m, tape_sigma_rad), len(views))
 
     def misfit(x: Array) -> Array:

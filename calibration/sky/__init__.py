@@ -1,9 +1,15 @@
-"""The calibrations of the sky, ready for a command, a console or a notebook.
+"""The star camera and the sky above it.
 
-Each is one function: arrays in, progress told through a callback, an ``Outcome`` out with its numbers,
-their uncertainties, warnings, a one-line summary and a figure. Nothing is printed, read or written.
+=======================  ==========================================================================
+``survey``               the star list from a sweep
+``amend, amendment``     the list brought up to date by what was found while flying
+``lens``                 lens and mount by the stars, lens by a board
+``delay``                from the exposure to the arrival, against the IMU
+``self_calibration``     the mathematics of lens and mount under a known ceiling
+``sky_adjustment``       least squares over cameras, poses and stars
+``residual_structure``   do residuals depend on the place in the picture
+=======================  ==========================================================================
+
+A procedure takes arrays, reports its progress through a callback and returns an ``Outcome``: numbers with
+their uncertainties, warnings, a summary and a figure. Only ``commands`` prints and writes.
 """
-
-from calibration.sky.outcome import CalibrationRefusedError, Outcome, Progress
-
-__all__ = ["CalibrationRefusedError", "Outcome", "Progress"]

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.outcome import CalibrationRefusedError
 from groundstation.star_tracking.sky_change import Change, SkyChange
 
 SAME_LIGHT_M = 0.015
 """Two findings so near to each other are of one light."""
 
 
-class AmendmentError(ValueError):
+class AmendmentError(CalibrationRefusedError):
     """The findings are not about this star list; the message is one sentence."""
 
 
@@ -83,9 +84,9 @@ def propose(names: Sequence[str], found: Iterable[tuple[str, SkyChange]], min_si
     dead = {star for (_, star), change in life.items() if change.change is Change.DIED}
     moved = []
     for name in names:
-        said = [row for (_, star), row in place.items() if star == name and row.change is Change.MOVED]
-        if said and name not in dead:
-            moved.append(_average(name, said))
+        moves = [row for (_, star), row in place.items() if star == name and row.change is Change.MOVED]
+        if moves and name not in dead:
+            moved.append(_average(name, moves))
     number = max((int(name) for name in names if name.isdecimal()), default=-1) + 1
     added = []
     for group in _groups([light for _, light in lights]):
@@ -111,10 +112,10 @@ def _groups(lights: Sequence[SkyChange]) -> list[list[SkyChange]]:
     return groups
 
 
-def _average(name: str, said: Sequence[SkyChange]) -> NewPlace:
+def _average(name: str, found: Sequence[SkyChange]) -> NewPlace:
     """Combine places by their covariances."""
     information, weighted = np.zeros((2, 2)), np.zeros(2)
-    for change in said:
+    for change in found:
         xx, xy, yy = change.cov_m2
         weight = np.linalg.inv([[xx, xy], [xy, yy]])
         information += weight
@@ -122,5 +123,5 @@ def _average(name: str, said: Sequence[SkyChange]) -> NewPlace:
     cov = np.linalg.inv(information)
     x, y = cov @ weighted
     std_x, std_y = np.sqrt(np.diag(cov))
-    sightings = sum(change.sightings for change in said)
+    sightings = sum(change.sightings for change in found)
     return NewPlace(name, float(x), float(y), float(std_x), float(std_y), sightings)

@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
+
 MIN_PICTURES = 5
 _CORNER_WINDOW = (7, 7)
 
@@ -93,7 +95,9 @@ def calibrate_from_board(
         ValueError: Fewer than five views.
     """
     if len(views) < MIN_PICTURES:
-        raise ValueError(f"the board was seen in {len(views)} pictures, {MIN_PICTURES} are needed")
+        raise CalibrationRefusedError(
+            f"the board was seen in {len(views)} pictures, {MIN_PICTURES} are needed"
+        )
     points = [view[0] for view in views]
     pixels = [view[1] for view in views]
     start = np.array([[width, 0.0, 0.5 * (width - 1)], [0.0, width, 0.5 * (height - 1)], [0.0, 0.0, 1.0]])

@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity
 from calibration.sky.delay_fit import camera_delay
 from calibration.sky.figures import draw_delay
-from calibration.sky.outcome import CalibrationRefusedError, Outcome, Progress, silent
+from groundstation.cli.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def delay_from_headings(
             continue
         try:
             found = camera_delay(gyro_t_s, rate_rad_s, arrival_t_s, heading_rad, guess)
-        except ValueError as error:
+        except CalibrationRefusedError as error:
             refusal = refusal or str(error)
             continue
         cost = (-int(found.used.sum()), float((found.residual_rad**2).mean()))
@@ -59,10 +60,7 @@ def delay_from_headings(
     if best is None:
         raise CalibrationRefusedError(refusal)
     # A guess far off leaves out headings at the ends that the delay found can use: once more from there.
-    try:
-        found = camera_delay(gyro_t_s, rate_rad_s, arrival_t_s, heading_rad, best[1].delay_s)
-    except ValueError as error:
-        raise CalibrationRefusedError(str(error)) from error
+    found = camera_delay(gyro_t_s, rate_rad_s, arrival_t_s, heading_rad, best[1].delay_s)
     rms = float(np.sqrt((found.residual_rad**2).mean()))
     warnings: tuple[str, ...] = ()
     if found.delay_s < 0.0:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.sky.delay_noise import fit_noise, gyro_walk_rad2_s
 
 Array = NDArray[np.float64]
@@ -64,17 +65,19 @@ def camera_delay(
         guess_s: First guess of the delay.
 
     Raises:
-        ValueError: The times do not rise, too few headings lie inside the gyro's, or the turn rate
-            changes too little to see a delay.
+        CalibrationRefusedError: The times do not rise, too few headings lie inside the gyro's, or the
+            turn rate changes too little to see a delay.
     """
     if len(gyro_t_s) < 2 or (np.diff(gyro_t_s) <= 0.0).any():
-        raise ValueError("the gyro's times must rise")
+        raise CalibrationRefusedError("the gyro's times must rise")
     # A sample is the mean over the window that ends at its time: the angle there is the sum.
     angle = np.concatenate(([0.0], np.cumsum(rate_rad_s[1:] * np.diff(gyro_t_s))))
     delay, middle = guess_s, float(gyro_t_s.mean())
     inside = (arrival_t_s - guess_s > gyro_t_s[0] + 1.0) & (arrival_t_s - guess_s < gyro_t_s[-1] - 1.0)
     if int(inside.sum()) < _MIN_HEADINGS:
-        raise ValueError(f"{int(inside.sum())} headings lie inside the gyro's times, 10 are needed")
+        raise CalibrationRefusedError(
+            f"{int(inside.sum())} headings lie inside the gyro's times, 10 are needed"
+        )
     times, heading = arrival_t_s[inside], heading_rad[inside]
     offset = bias = 0.0
     scale = 1.0
@@ -96,14 +99,16 @@ def camera_delay(
         normal = design[used].T @ weighted
         size = np.sqrt(np.diag(normal))
         if size.min() <= 0.0 or np.linalg.cond(normal / np.outer(size, size)) > _WORST_CONDITION:
-            raise ValueError("the turn rate changes too little to see a delay")
+            raise CalibrationRefusedError("the turn rate changes too little to see a delay")
         change = np.linalg.solve(normal, weighted.T @ residual[used])
         delay, bias, scale = delay + change[0], bias + change[2], scale + change[3]
         offset += change[1] - change[3] * turned.mean()
         if abs(change[0]) < 1e-7:
             break
     if int(used.sum()) < _MIN_HEADINGS:
-        raise ValueError(f"{int(used.sum())} headings fit the gyro's turn, {_MIN_HEADINGS} are needed")
+        raise CalibrationRefusedError(
+            f"{int(used.sum())} headings fit the gyro's turn, {_MIN_HEADINGS} are needed"
+        )
     times, heading = times[used], heading[used]
     noise, normal = None, np.eye(3)
     for _ in range(_FINAL_STEPS):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.files.png import new_figure
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -18,10 +20,10 @@ Array = NDArray[np.float64]
 
 def draw_residuals(residual_px: Array, structure: ResidualStructure | None, title: str) -> Figure:
     """Residuals (m, 2): as a cloud, their distribution, and their means over the picture."""
-    figure = _figure(15.0 if structure is not None else 10.0, 4.5)
+    figure = new_figure(15.0 if structure is not None else 10.0, 4.5)
     axes = figure.subplots(1, 3 if structure is not None else 2)
-    _cloud(axes[0], residual_px, title)
-    _distribution(axes[1], residual_px)
+    draw_cloud(axes[0], residual_px, title)
+    draw_distribution(axes[1], residual_px)
     if structure is not None:
         _means(axes[2], structure)
     return figure
@@ -29,7 +31,7 @@ def draw_residuals(residual_px: Array, structure: ResidualStructure | None, titl
 
 def draw_delay(t_s: Array, residual_rad: Array, rate_rad_s: Array, delay_s: float) -> Figure:
     """What is left of the headings after the delay: over time, and over the turn rate."""
-    figure = _figure(11.0, 4.2)
+    figure = new_figure(11.0, 4.2)
     over_time, over_rate = figure.subplots(1, 2, sharey=True)
     over_time.plot(t_s, np.degrees(residual_rad), ".")
     over_time.set(xlabel="t (s)", ylabel="heading residual (deg)", title=f"delay {1e3 * delay_s:.2f} ms")
@@ -60,7 +62,7 @@ def draw_survey(
         structure: Their means over the picture.
         verified_mm: Star minus spot in pictures that the map was made without, shape (k, 2); may be empty.
     """
-    figure = _figure(14.0, 9.0)
+    figure = new_figure(14.0, 9.0)
     sky, means, cloud, verified = figure.subplots(2, 2).ravel()
     sky.plot(pose[:, 0], pose[:, 1], "-", color="0.8", linewidth=1, zorder=0)
     dots = sky.scatter(
@@ -74,7 +76,7 @@ def draw_survey(
         title=f"{len(star_m)} stars; larger: seen more often; line: the sweep",
     )
     _means(means, structure)
-    _cloud(cloud, residual_px, "all pictures")
+    draw_cloud(cloud, residual_px, "all pictures")
     if len(verified_mm):
         verified.hist(np.hypot(verified_mm[:, 0], verified_mm[:, 1]), bins=60)
         rms = float(np.sqrt((verified_mm**2).mean()))
@@ -85,43 +87,16 @@ def draw_survey(
     return figure
 
 
-def draw_board_pose(residual_px: Array, tape_m: Array, tape_rad: Array) -> Figure:
-    """What a board on the table leaves of the camera above it: its corners, and each place against the tape.
-
-    Args:
-        residual_px: Corner minus model, shape (n, 2).
-        tape_m: By how much each place had to be moved, shape (k, 2).
-        tape_rad: And turned, shape (k,).
-    """
-    figure = _figure(15.0, 4.5)
-    corners, spread, tape = figure.subplots(1, 3)
-    _cloud(corners, residual_px, "corners of the board")
-    _distribution(spread, residual_px)
-    tape.plot(1e3 * tape_m[:, 0], 1e3 * tape_m[:, 1], "o")
-    for number, (place_m, turn_rad) in enumerate(zip(tape_m, tape_rad, strict=True), start=1):
-        words = f"{number}: {np.degrees(turn_rad):+.2f} deg"
-        tape.annotate(words, 1e3 * place_m, (0, 6), textcoords="offset points", ha="center")
-    tape.axhline(0.0, color="0.8", zorder=0)
-    tape.axvline(0.0, color="0.8", zorder=0)
-    tape.margins(0.35)
-    tape.set(xlabel="moved in x (mm)", ylabel="moved in y (mm)", title="places against the tape")
-    return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def _cloud(axes: Axes, residual_px: Array, title: str) -> None:
+def draw_cloud(axes: Axes, residual_px: Array, title: str) -> None:
+    """Residuals (m, 2) of pixels as dots."""
     axes.plot(residual_px[:, 0], residual_px[:, 1], ".", markersize=2)
     axes.set(xlabel="u residual (px)", ylabel="v residual (px)", aspect="equal", title=title)
     axes.locator_params(nbins=6)
     axes.grid(visible=True, alpha=0.3)
 
 
-def _distribution(axes: Axes, residual_px: Array) -> None:
+def draw_distribution(axes: Axes, residual_px: Array) -> None:
+    """Their distribution beside a Gaussian one."""
     sigma = max(float(np.sqrt((residual_px**2).mean())), 1e-9)
     axes.hist(residual_px.ravel(), bins=80, density=True, alpha=0.7)
     axis = np.linspace(-5.0 * sigma, 5.0 * sigma, 200)

@@ -8,24 +8,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError, Outcome, adjusting
 from calibration.result import Quantity
 from calibration.sky.board import Board, calibrate_from_board, find_corners
 from calibration.sky.figures import draw_residuals
-from calibration.sky.outcome import (
-    CalibrationRefusedError,
-    Outcome,
-    Progress,
-    adjusting,
-    silent,
-)
 from calibration.sky.quantities import LENS_NAMES, UNITS, camera_quantities
 from calibration.sky.residual_structure import find_structure
 from calibration.sky.self_calibration import (
     SkyCalibration,
-    SkyCalibrationError,
     calibrate_intrinsics,
     calibrate_mount,
 )
+from groundstation.cli.progress import Progress, silent
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -51,12 +45,9 @@ def lens_from_stars(
     Raises:
         CalibrationRefusedError: Too few pictures can be solved, or they do not determine the lens.
     """
-    try:
-        found = calibrate_intrinsics(
-            pictures, catalogue, camera, wobble_std_m=wobble_m, progress=adjusting(progress)
-        )
-    except SkyCalibrationError as error:
-        raise CalibrationRefusedError(str(error)) from error
+    found = calibrate_intrinsics(
+        pictures, catalogue, camera, wobble_std_m=wobble_m, progress=adjusting(progress)
+    )
     return _outcome("Camera intrinsics from the star field", found, len(pictures))
 
 
@@ -82,17 +73,14 @@ def mount_from_turn(
     Raises:
         CalibrationRefusedError: Too few pictures can be solved, or the turn is too small.
     """
-    try:
-        found = calibrate_mount(
-            pictures,
-            catalogue,
-            camera,
-            wobble_std_m=wobble_m,
-            first_heading_rad=first_heading_rad,
-            progress=adjusting(progress),
-        )
-    except SkyCalibrationError as error:
-        raise CalibrationRefusedError(str(error)) from error
+    found = calibrate_mount(
+        pictures,
+        catalogue,
+        camera,
+        wobble_std_m=wobble_m,
+        first_heading_rad=first_heading_rad,
+        progress=adjusting(progress),
+    )
     return _outcome("Camera mount by turning in place", found, len(pictures))
 
 
@@ -132,10 +120,7 @@ def lens_from_board(
     if size is None:
         raise CalibrationRefusedError("there is no picture")
     progress("adjusting", math.nan)
-    try:
-        lens = calibrate_from_board(views, size[1], size[0])
-    except ValueError as error:
-        raise CalibrationRefusedError(str(error)) from error
+    lens = calibrate_from_board(views, size[1], size[0])
     values = (lens.fx, lens.fy, lens.cx, lens.cy, *lens.distortion)
     pixel = np.concatenate([view[1] for view in views]).astype(np.float64)
     structure = find_structure(pixel, lens.residual_px, size[1], size[0])

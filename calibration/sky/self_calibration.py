@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.sky.sky_adjustment import (
     CENTRE,
     DISTORTION,
@@ -46,7 +47,7 @@ _MIN_PICTURES = 4
 _MIN_SPAN_RAD = np.deg2rad(200.0)
 
 
-class SkyCalibrationError(ValueError):
+class SkyCalibrationError(CalibrationRefusedError):
     """The pictures do not calibrate the camera; the message is one sentence."""
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.table.chain import (
     BIAS,
     DELAY,
@@ -92,7 +93,7 @@ def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> Flig
     """Turn a flight into normal equations.
 
     Raises:
-        ValueError: fewer than five fixes, or nothing was flown.
+        CalibrationRefusedError: fewer than five fixes, or nothing was flown.
     """
     size = NUISANCES + 2 + field.size
     J, h, power, rows = np.zeros((size, size)), np.zeros(size), 0.0, 0
@@ -114,7 +115,9 @@ def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> Flig
     X, y = X[:filled], y[:filled]
     J, h, power, rows = J + X.T @ X, h + X.T @ y, power + float(y @ y), rows + filled
     if fixes < 5:
-        raise ValueError(f"{log.name} has {fixes} fixes within its packets; a flight needs at least five")
+        raise CalibrationRefusedError(
+            f"{log.name} has {fixes} fixes within its packets; a flight needs at least five"
+        )
     a, b = slice(0, NUISANCES), slice(NUISANCES, size)
     factor = cho_factor(J[a, a] + np.diag(1.0 / priors.variances()))
     own = cho_solve(factor, h[a])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.table.chain import NUISANCES, innovations
 from calibration.table.equations import FlightPriors
 from calibration.table.flight_log import FlightLog
@@ -54,7 +55,7 @@ def check_outages(
     The flight's own unknowns (bias, scale, lever arm) are estimated from all fixes for each of the three.
 
     Raises:
-        ValueError: the flight is too short for an outage.
+        CalibrationRefusedError: the flight is too short for an outage.
     """
     phase = np.mod(log.fix_s - log.fix_s[0], length_s + seen_s)
     used = (phase < seen_s) | log.is_resting(log.fix_s)
@@ -73,7 +74,7 @@ def check_outages(
         ]
         errors.append(np.array(ends).reshape(-1, 2))
     if not len(errors[0]):
-        raise ValueError(f"{log.name} is too short for an outage of {length_s:g} s")
+        raise CalibrationRefusedError(f"{log.name} is too short for an outage of {length_s:g} s")
     rms = [float(np.sqrt((e**2).sum(axis=1).mean())) for e in errors]
     return OutageCheck(rms[0], rms[1], rms[2], len(errors[0]), length_s)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.table.equations import FlightEquations
 from calibration.table.surface_basis import SurfaceBasis
 
@@ -85,10 +86,10 @@ def fit_surface(
         slope_sigma_m_s2: of the mean slope before anything is known; 0.02 is 2 mrad.
 
     Raises:
-        ValueError: there are no flights.
+        CalibrationRefusedError: there are no flights.
     """
     if not flights:
-        raise ValueError("there are no flights to learn from")
+        raise CalibrationRefusedError("there are no flights to learn from")
     factor = 1.0
     for _ in range(2):  # the second time with the noise that the first time has shown
         scaled = [flight.scaled(factor) for flight in flights]

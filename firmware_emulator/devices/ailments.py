@@ -1,10 +1,10 @@
-"""What deflects the sensors' codes beside motion: self-tests that the host asked for, and faults."""
+"""What deflects the sensors' codes beside motion: self-tests that the host asked for, and failures."""
 
 import math
 
 from drivers.imu_block.protocol import SelfTestChannel
 from firmware_emulator.devices.imu_sensors import GYRO_NULL, Disturbances
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 
 OUT_OF_WINDOW_CODE = 2047.0  # SCA103T: parity or connection failure forces the output to a rail
 GYRO_SELF_TEST_COUNTS = 221.0  # ADIS16100: 270 mV over 1.2207 mV
@@ -18,18 +18,17 @@ _TILT_TESTS = (
 
 
 class Ailments:
-    """Self-test and faults of one block.
+    """Self-test and failures of one block.
 
     Args:
-        faults: `stuck_gyro`, `dead_tilt`.
+        failures: `stuck_gyro`, `dead_tilt`.
 
     Attributes:
         held_gyro_code: The last code of the gyro, which a stuck one repeats.
     """
 
-    def __init__(self, faults: Faults) -> None:
-        self._faults = faults
-        self._is_faulty = faults.has("stuck_gyro") or faults.has("dead_tilt")
+    def __init__(self, failures: Failures) -> None:
+        self._failures = failures
         self._channels, self._last_poll = SelfTestChannel(0), 0
         self.held_gyro_code = round(GYRO_NULL)
 
@@ -44,7 +43,7 @@ class Ailments:
 
     def at(self, age_ns: int, window_end: int) -> Disturbances | None:
         """What disturbs the window that ends with poll `window_end`, `age_ns` after power-up."""
-        if not (self._is_faulty or self._channels):
+        if not (self._channels or self._failures.has("stuck_gyro", "dead_tilt")):
             return None
         if window_end > self._last_poll:
             self._channels = SelfTestChannel(0)
@@ -56,11 +55,11 @@ class Ailments:
         for channel, bit in enumerate(_TILT_TESTS):
             if self._channels & bit:
                 disturbances.forced_tilts[channel] = TILT_SELF_TEST_CODE
-        stuck = self._faults.active("stuck_gyro", age_ns)
+        stuck = self._failures.active("stuck_gyro", age_ns)
         if stuck:
             code = stuck.parameters["code"]
             disturbances.gyro_stuck_code = self.held_gyro_code if math.isnan(code) else round(code)
-        for dead in self._faults.all_active("dead_tilt", age_ns):
+        for dead in self._failures.all_active("dead_tilt", age_ns):
             first = 2 * int(dead.parameters["axis"])
             disturbances.forced_tilts.update({first: OUT_OF_WINDOW_CODE, first + 1: OUT_OF_WINDOW_CODE})
         return disturbances

@@ -34,7 +34,7 @@ from firmware_emulator.devices.ailments import Ailments
 from firmware_emulator.devices.imu_sensors import Disturbances, ImuSensors
 from firmware_emulator.devices.sensor_errors import WarmUp
 from firmware_emulator.devices.serial_line import PACKET_BYTES, SerialLine
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.plant.motion_state import PollGrid, last_polls
 from firmware_emulator.plant.rigid_body import Vehicle
 
@@ -60,7 +60,7 @@ class ImuBlock:
         averaging: Polls per frame.
         serial_number: For identify.
         warm_up: Its temperature.
-        faults: `stuck_gyro`, `dead_tilt`.
+        failures: `stuck_gyro`, `dead_tilt`.
         rng: For the noise of temperature readings.
         start_ns: Power-up.
     """
@@ -75,7 +75,7 @@ class ImuBlock:
         averaging: int,
         serial_number: int,
         warm_up: WarmUp,
-        faults: Faults,
+        failures: Failures,
         rng: np.random.Generator,
         start_ns: int = 0,
     ) -> None:
@@ -85,7 +85,7 @@ class ImuBlock:
         self._averaging = self._window = averaging
         self._serial_number = serial_number
         self._warm_up, self._rng = warm_up, rng
-        self._ailments = Ailments(faults)
+        self._ailments = Ailments(failures)
         self._start_ns = start_ns
         self._inbox: deque[tuple[int, bytes]] = deque()
         self._commands = CommandParser()
@@ -111,6 +111,10 @@ class ImuBlock:
         wire_bytes = V1_WIRE_BYTES if self._version == 1 else V2_WIRE_BYTES
         period_ns = int(min(self._window, self._averaging) * self._grid.period_ns)
         return self.line.next_arrival_ns(first_send_ns, wire_bytes, period_ns)
+
+    def take(self, until_ns: int) -> list[tuple[int, bytes]]:
+        """Chunks of bytes that reached the host up to `until_ns`."""
+        return self.line.take(until_ns)
 
     def receive(self, stamp_ns: int, data: bytes) -> None:
         """Bytes that the host writes at `stamp_ns`; they take their time on the line."""

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 @dataclass(slots=True)
 class Disturbances:
-    """What a self-test or a fault does to the codes of one window."""
+    """What a self-test or a failure does to the codes of one window."""
 
     gyro_add_counts: float = 0.0
     gyro_stuck_code: float | None = None

@@ -3,14 +3,20 @@
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
+from drivers.laboratory import ChannelKind
+from firmware_emulator.device_kind import DeviceKind, PictureOrder
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.devices.star_camera import Pose
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
+from firmware_emulator.scenario import Scenario, Site
+from firmware_emulator.settings import NonNegative, Positive, Settings
 
 _JITTER_LIMIT = 6.0  # standard deviations
 
@@ -32,6 +38,31 @@ class TableExposure:
     arrival_ns: int
 
 
+class OverheadConfig(Settings):
+    """The camera over the table that looks down: one for the laboratory."""
+
+    camera: str
+    """Path of the camera file (JSON)."""
+    circles: str
+    """Path of what each mock-up wears (TOML)."""
+    rate_hz: Positive = 10.0
+    exposure_s: Positive = 0.01
+    delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.02
+    """From the middle of the exposure to the host."""
+    delay_jitter_s: NonNegative = 0.001
+    stream: Literal["raw", "mjpeg"] = "raw"
+    """How live pictures are served over HTTP."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
+
+    @model_validator(mode="after")
+    def _exposure_fits_the_rate(self) -> "OverheadConfig":
+        if self.exposure_s * self.rate_hz >= 1.0:
+            raise ValueError(
+                f"exposure_s = {self.exposure_s:g} s is longer than a period of rate_hz = {self.rate_hz:g}"
+            )
+        return self
+
+
 class OverheadCamera:
     """Timing of the exposures, and what moves during each.
 
@@ -41,7 +72,7 @@ class OverheadCamera:
         exposure_s: How long a picture is exposed, all rows at once.
         delay_s: From the middle of the exposure until the picture is at the host.
         delay_jitter_s: Its standard deviation.
-        faults: Of each vehicle: `hidden_discs`.
+        failures: Of each vehicle: `hidden_discs`.
         rng: For the jitter.
         start_ns: First exposure begins half a period later, between those of star cameras of the same rate.
     """
@@ -53,11 +84,11 @@ class OverheadCamera:
         exposure_s: float,
         delay_s: float,
         delay_jitter_s: float,
-        faults: Mapping[str, Faults],
+        failures: Mapping[str, Failures],
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
-        self._vehicles, self._faults = dict(vehicles), dict(faults)
+        self._vehicles, self._failures = dict(vehicles), dict(failures)
         self._period_ns = round(NS_PER_S / rate_hz)
         self._open_ns = round(exposure_s * NS_PER_S)
         self._delay_ns = round(delay_s * NS_PER_S)
@@ -119,8 +150,50 @@ class OverheadCamera:
 
     def _hidden(self, age_ns: int) -> dict[str, int]:
         found = {}
-        for name, faults in self._faults.items():
-            fault = faults.active("hidden_discs", age_ns)
-            if fault is not None:
-                found[name] = int(fault.parameters["count"])
+        for name, failures in self._failures.items():
+            failure = failures.active("hidden_discs", age_ns)
+            if failure is not None:
+                found[name] = int(failure.parameters["count"])
         return found
+
+
+def build(site: Site, settings: OverheadConfig) -> OverheadCamera:
+    """The camera over the table."""
+    return OverheadCamera(
+        {mock_up.name: mock_up.vehicle for mock_up in site.mock_ups},
+        settings.rate_hz,
+        settings.exposure_s,
+        settings.delay_s,
+        settings.delay_jitter_s,
+        {mock_up.name: mock_up.failures for mock_up in site.mock_ups},
+        site.scenario.random("overhead_camera"),
+        site.scenario.start_ns,
+    )
+
+
+def order(scenario: Scenario, index: int, settings: OverheadConfig) -> PictureOrder:
+    """Who draws the table."""
+    config = scenario.config
+    return PictureOrder(
+        name="overhead_camera",
+        renderer="firmware_emulator.devices.table_renderer:TableRenderer",
+        arguments={
+            "camera": config.path(settings.camera),
+            "circles": config.path(settings.circles),
+            "bounds_m": list(config.table.bounds_m),
+            "radii_m": {vehicle.name: vehicle.radius_m for vehicle in config.vehicles},
+            "seed": [*scenario.seed_words, len(config.vehicles) + 1],
+        },
+        stream=settings.stream,
+        jpeg_quality=settings.jpeg_quality,
+    )
+
+
+OVERHEAD_CAMERA = DeviceKind(
+    name="overhead_camera",
+    channel=ChannelKind.CAMERA,
+    per_laboratory=build,
+    section="overhead",
+    settings=OverheadConfig,
+    pictures=order,
+)

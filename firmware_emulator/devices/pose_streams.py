@@ -10,12 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.laboratory import ChannelKind
 from drivers.reference.protocol import ReferencePose, encode
+from firmware_emulator.device_kind import DeviceKind
+from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
+from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
+from firmware_emulator.scenario import MockUp
 
 _SEQUENCE_MODULUS = 1 << 16
 _TRUE_UNCERTAINTY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -99,7 +104,7 @@ class FixStream:
         delay_s: From an exposure to its fix at the host, as the fix says.
         delay_jitter_s: Standard deviation of the real delay.
         errors: What is wrong with the fixes.
-        faults: Camera faults: `dead_sky`, `silent_camera`, `frozen_camera`, `false_lights`.
+        failures: Camera failures: `dead_sky`, `silent_camera`, `frozen_camera`, `false_lights`.
         rng: Random numbers.
         start_ns: First exposure one period later.
     """
@@ -112,7 +117,7 @@ class FixStream:
         delay_s: float,
         delay_jitter_s: float,
         errors: FixErrors,
-        faults: Faults,
+        failures: Failures,
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
@@ -120,7 +125,7 @@ class FixStream:
         self._period_ns = round(NS_PER_S / rate_hz)
         self._delay_ns = round(delay_s * NS_PER_S)
         self._jitter_ns = delay_jitter_s * NS_PER_S
-        self._errors, self._faults, self._rng = errors, faults, rng
+        self._errors, self._failures, self._rng = errors, failures, rng
         self._start_ns = start_ns
         self.next_ns = start_ns + self._period_ns
         self._sequence = 0
@@ -143,13 +148,13 @@ class FixStream:
         """Expose: draw the fix that is due."""
         self.next_ns += self._period_ns
         age_ns = now_ns - self._start_ns
-        draws = self._rng.standard_normal(4)  # drawn in any case, so that faults do not shift the rest
+        draws = self._rng.standard_normal(4)  # drawn in any case, so that failures do not shift the rest
         missing, wrong, gross = self._rng.uniform(size=3)
-        if self._faults.active("dead_sky", age_ns) or self._faults.active("silent_camera", age_ns):
+        if self._failures.active("dead_sky", age_ns) or self._failures.active("silent_camera", age_ns):
             return
         if missing < self._errors.missing_fraction:
             return
-        if not self._faults.active("frozen_camera", age_ns):
+        if not self._failures.active("frozen_camera", age_ns):
             self._frozen = None
         elif self._frozen is None:
             self._frozen = self._vehicle.origin_at(now_ns)
@@ -157,7 +162,7 @@ class FixStream:
         x_m = motion.x_m + self._errors.sigma_xy_m * draws[0]
         y_m = motion.y_m + self._errors.sigma_xy_m * draws[1]
         heading_rad = motion.heading_rad + self._errors.sigma_heading_rad * draws[2]
-        if wrong < self._errors.wrong_fraction or self._faults.active("false_lights", age_ns):
+        if wrong < self._errors.wrong_fraction or self._failures.active("false_lights", age_ns):
             x_m, y_m, heading_rad = self._mistaken(x_m, y_m, heading_rad, bool(gross < _GROSS_SHARE))
         self._send(now_ns, float(draws[3]), float(x_m), float(y_m), float(heading_rad))
 
@@ -199,3 +204,53 @@ class FixStream:
 _GROSS_SHARE = 0.5
 _SUBTLE_M = (0.03, 0.12)
 _SUBTLE_RAD = 0.05
+
+
+def build_truth(mock_up: MockUp, config: VehicleConfig) -> TruthStream | None:
+    """The truth about a mock-up, if its table asks for it."""
+    if config.reference_rate_hz == 0.0:
+        return None
+    return TruthStream(
+        mock_up.index, mock_up.vehicle, config.reference_rate_hz, config.reference_delay_s, mock_up.start_ns
+    )
+
+
+def build_fixes(mock_up: MockUp, settings: CameraConfig) -> FixStream | None:
+    """The drawn fixes of a mock-up, if they stand in for its camera."""
+    if settings.source != "fixes":
+        return None
+    errors = FixErrors(
+        settings.sigma_xy_m,
+        settings.sigma_heading_rad,
+        settings.missing_fraction,
+        settings.wrong_fraction,
+        mock_up.scenario.config.table.bounds_m,
+    )
+    return FixStream(
+        mock_up.index,
+        mock_up.vehicle,
+        settings.rate_hz,
+        settings.delay_s,
+        settings.delay_jitter_s,
+        errors,
+        mock_up.failures,
+        mock_up.random("camera"),
+        mock_up.start_ns,
+    )
+
+
+REFERENCE = DeviceKind(
+    name="reference",
+    channel=ChannelKind.BYTES,
+    per_vehicle=build_truth,
+    served_by="firmware_emulator.live.served:TcpServed",
+)
+FIXES = DeviceKind(
+    name="fixes",
+    channel=ChannelKind.BYTES,
+    per_vehicle=build_fixes,
+    section="camera",
+    settings=CameraConfig,
+    is_standard=True,
+    served_by="firmware_emulator.live.served:TcpServed",
+)

@@ -2,7 +2,7 @@
 
 Bytes leave one by one at the real baud rate. The FTDI chip hands them on in packets: as soon as 62 wait, or
 when the latency timer has run since the first of them (FTDI AN232B-04). The host's USB stack adds a little
-random time. Line faults act on bytes before they reach the chip.
+random time. Line failures act on bytes before they reach the chip.
 """
 
 from collections import deque
@@ -10,7 +10,7 @@ from collections import deque
 import numpy as np
 
 from firmware_emulator.devices.pending import take_until
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 
 NS_PER_S = 1_000_000_000
 BITS_PER_BYTE = 10  # start, eight data, stop
@@ -26,9 +26,9 @@ class SerialLine:
         baud: Nominal rate, a key of `ACTUAL_BAUD`.
         latency_s: FTDI latency timer.
         host_jitter_s: Mean of the exponentially distributed wait of a packet in the host.
-        faults: Line faults.
-        rng: For jitter and faults.
-        start_ns: Laboratory time that the faults count from.
+        failures: Line failures.
+        rng: For jitter and failures.
+        start_ns: Laboratory time that the failures count from.
     """
 
     def __init__(
@@ -36,15 +36,14 @@ class SerialLine:
         baud: int,
         latency_s: float,
         host_jitter_s: float,
-        faults: Faults,
+        failures: Failures,
         rng: np.random.Generator,
         start_ns: int = 0,
     ) -> None:
         self.byte_ns = BITS_PER_BYTE * NS_PER_S / ACTUAL_BAUD[baud]
         self._latency_ns = round(latency_s * NS_PER_S)
         self._jitter_s = host_jitter_s
-        self._faults = faults
-        self._is_faulty = any(faults.has(kind) for kind in ("bit_flips", "lost_bytes", "half_frames"))
+        self._failures = failures
         self._rng = rng
         self._start_ns = start_ns
         self.free_ns = start_ns  # when the last bit handed over so far has left
@@ -59,7 +58,7 @@ class SerialLine:
         """Put bytes on the line at `stamp_ns` or when it is free; return when the last bit has left."""
         begin_ns = max(stamp_ns, self.free_ns)
         self.free_ns = begin_ns + round(len(data) * self.byte_ns)
-        if self._is_faulty:
+        if self._failures.has("bit_flips", "lost_bytes", "half_frames"):
             data = self._damage(data, begin_ns)
         self._buffer(data, begin_ns)
         return self.free_ns
@@ -119,14 +118,14 @@ class SerialLine:
 
     def _damage(self, data: bytes, stamp_ns: int) -> bytes:
         age_ns = stamp_ns - self._start_ns
-        half = self._faults.active("half_frames", age_ns)
+        half = self._failures.active("half_frames", age_ns)
         if half and self._rng.uniform() < half.parameters["probability_per_frame"]:
             data = data[: int(self._rng.integers(len(data)))]
-        lost = self._faults.active("lost_bytes", age_ns)
+        lost = self._failures.active("lost_bytes", age_ns)
         if lost and data:
             kept = self._rng.uniform(size=len(data)) >= lost.parameters["probability_per_byte"]
             data = np.frombuffer(data, np.uint8)[kept].tobytes()
-        flips = self._faults.active("bit_flips", age_ns)
+        flips = self._failures.active("bit_flips", age_ns)
         if flips and data:
             flipped = self._rng.uniform(size=8 * len(data)) < flips.parameters["probability_per_bit"]
             data = (np.frombuffer(data, np.uint8) ^ np.packbits(flipped)).tobytes()

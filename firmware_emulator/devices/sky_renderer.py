@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
 from firmware_emulator.sky.sensor import SensorSettings
+from firmware_emulator.sky.sky import SkyFailures
 from firmware_emulator.sky.sky_camera import Shutter, SkyCamera
 
 
 class SkyRenderer:
-    """Draws exposures (`firmware_emulator.devices.star_camera.Renderer`)."""
+    """Draws exposures (`firmware_emulator.device_kind.Renderer`)."""
 
     def __init__(self, camera: SkyCamera) -> None:
         self._camera = camera
@@ -24,7 +25,8 @@ class SkyRenderer:
         cls,
         ceiling: str | Path,
         camera: str | Path,
-        shutter: Shutter,
+        exposure_s: float,
+        readout_s: float,
         sky_seed: Sequence[int],
         camera_seed: Sequence[int],
     ) -> Self:
@@ -33,7 +35,8 @@ class SkyRenderer:
         Args:
             ceiling: Star list, CSV `id,x_m,y_m`, ceiling coordinates.
             camera: Camera file (JSON): intrinsics, distortion, mount.
-            shutter: Exposure and readout.
+            exposure_s: How long a row is exposed.
+            readout_s: From the first row's exposure to the last one's.
             sky_seed: Decides the LEDs' brightness and the places of false lights; one sky for all cameras.
             camera_seed: Decides this camera's noise and hot pixels.
 
@@ -43,7 +46,13 @@ class SkyRenderer:
         sky = build_sky(read_ceiling(Path(ceiling)), np.random.SeedSequence(list(sky_seed)))
         optics = read_camera(Path(camera))
         seed = np.random.SeedSequence(list(camera_seed))
-        return cls(SkyCamera(optics, sky, shutter, SensorSettings(), seed))
+        return cls(SkyCamera(optics, sky, Shutter(exposure_s, readout_s), SensorSettings(), seed))
+
+    @staticmethod
+    def exposure(fields: dict[str, Any]) -> Exposure:
+        """The exposure that `dataclasses.asdict` made into `fields`."""
+        failures = fields.pop("sky_failures")
+        return Exposure(**fields, sky_failures=None if failures is None else SkyFailures(**failures))
 
     def render(self, exposure: Exposure) -> NDArray[np.uint8]:
         """The picture, shape (height, width)."""
@@ -53,5 +62,5 @@ class SkyRenderer:
             sequence=exposure.sequence,
             is_sky_dead=exposure.is_sky_dead,
             false_lights=exposure.false_lights,
-            sky_faults=exposure.sky_faults,
+            sky_failures=exposure.sky_failures,
         )

@@ -1,22 +1,24 @@
 """The webcam that looks up: when it exposes, where the vehicle is meanwhile, when the picture arrives.
 
-What the picture shows is the business of `firmware_emulator.sky`, behind `Renderer`; so pictures may be
+What the picture shows is the business of `firmware_emulator.sky`, behind a `Renderer`; so pictures may be
 drawn at once (lockstep) or by another process (live).
 """
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.laboratory import ChannelKind
+from firmware_emulator.device_kind import DeviceKind, PictureOrder
+from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
-from firmware_emulator.sky.sky import SkyFaults
+from firmware_emulator.scenario import MockUp, Scenario
+from firmware_emulator.sky.sky import SkyFailures
 
 Pose = tuple[float, float, float]
 """x, y (m) and heading (rad) of the body origin in the table frame."""
@@ -35,7 +37,7 @@ class Exposure:
         arrival_ns: When the picture reaches the host.
         is_sky_dead: The lights are off.
         false_lights: Lights to add that no catalogue knows.
-        sky_faults: LEDs that differ from the list; None if all hang and shine as listed.
+        sky_failures: LEDs that differ from the list; None if all hang and shine as listed.
     """
 
     sequence: int
@@ -45,15 +47,7 @@ class Exposure:
     arrival_ns: int
     is_sky_dead: bool
     false_lights: int
-    sky_faults: SkyFaults | None = None
-
-
-class Renderer(Protocol):
-    """Draws what the camera sees."""
-
-    def render(self, exposure: Exposure) -> NDArray[np.uint8]:
-        """The picture, shape (height, width)."""
-        ...
+    sky_failures: SkyFailures | None = None
 
 
 class StarCamera:
@@ -66,7 +60,7 @@ class StarCamera:
         readout_s: From the first row's exposure to the last one's.
         delay_s: From the middle of the exposure until the picture is at the host.
         delay_jitter_s: Its standard deviation.
-        faults: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`, those of the sky.
+        failures: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`, those of the sky.
         rng: For the jitter.
         start_ns: First exposure begins one period later.
     """
@@ -79,7 +73,7 @@ class StarCamera:
         readout_s: float,
         delay_s: float,
         delay_jitter_s: float,
-        faults: Faults,
+        failures: Failures,
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
@@ -88,7 +82,7 @@ class StarCamera:
         self._open_ns = round((exposure_s + readout_s) * NS_PER_S)
         self._delay_ns = round(delay_s * NS_PER_S)
         self._jitter_ns = delay_jitter_s * NS_PER_S
-        self._faults, self._rng, self._start_ns = faults, rng, start_ns
+        self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._opens_ns = start_ns + self._period_ns
         self._start: Motion | None = None
         self._frozen: tuple[Pose, Pose] | None = None
@@ -123,34 +117,34 @@ class StarCamera:
         jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
         arrival_ns = max(now_ns, middle_ns + self._delay_ns + round(jitter * self._jitter_ns))
         self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
-        if not self._faults.active("frozen_camera", age_ns):
+        if not self._failures.active("frozen_camera", age_ns):
             self._frozen = None
         elif self._frozen is None:
             self._frozen = (start, end)
         start, end = self._frozen or (start, end)
-        false_lights = self._faults.active("false_lights", age_ns)
+        false_lights = self._failures.active("false_lights", age_ns)
         exposure = Exposure(
             self._sequence,
             start,
             end,
             middle_ns,
             self._last_arrival_ns,
-            self._faults.active("dead_sky", age_ns) is not None,
+            self._failures.active("dead_sky", age_ns) is not None,
             int(false_lights.parameters["count"]) if false_lights else 0,
-            self._sky_faults(age_ns),
+            self._sky_failures(age_ns),
         )
         self._sequence += 1
-        if not self._faults.active("silent_camera", age_ns):
+        if not self._failures.active("silent_camera", age_ns):
             self._pending.append((exposure.arrival_ns, exposure))
 
-    def _sky_faults(self, age_ns: int) -> SkyFaults | None:
+    def _sky_failures(self, age_ns: int) -> SkyFailures | None:
         dead, moved, new = (
-            [fault.parameters for fault in self._faults.all_active(kind, age_ns)]
+            [failure.parameters for failure in self._failures.all_active(kind, age_ns)]
             for kind in ("dead_star", "moved_star", "new_star")
         )
         if not (dead or moved or new):
             return None
-        return SkyFaults(
+        return SkyFailures(
             tuple(int(row["star"]) for row in dead),
             tuple((int(row["star"]), row["dx_m"], row["dy_m"]) for row in moved),
             tuple((row["x_m"], row["y_m"]) for row in new),
@@ -169,3 +163,52 @@ class StarCamera:
 
 def _pose(motion: Motion) -> Pose:
     return motion.x_m, motion.y_m, motion.heading_rad
+
+
+def build(mock_up: MockUp, settings: CameraConfig) -> StarCamera | None:
+    """The camera of a mock-up, if it takes pictures."""
+    if settings.source != "rendered":
+        return None
+    return StarCamera(
+        mock_up.vehicle,
+        settings.rate_hz,
+        settings.exposure_s,
+        settings.readout_s,
+        settings.delay_s,
+        settings.delay_jitter_s,
+        mock_up.failures,
+        mock_up.random("camera"),
+        mock_up.start_ns,
+    )
+
+
+def order(scenario: Scenario, index: int, settings: CameraConfig) -> PictureOrder | None:
+    """Who draws the pictures of vehicle `index`: all cameras look at one sky, each with noise of its own."""
+    if settings.source != "rendered":
+        return None
+    vehicle = scenario.config.vehicles[index]
+    return PictureOrder(
+        name=vehicle.name,
+        renderer="firmware_emulator.devices.sky_renderer:SkyRenderer",
+        arguments={
+            "ceiling": scenario.config.path(settings.ceiling),
+            "camera": scenario.config.path(settings.camera),
+            "exposure_s": settings.exposure_s,
+            "readout_s": settings.readout_s,
+            "sky_seed": scenario.seed_words,
+            "camera_seed": [*scenario.seed_words, 1 + index, vehicle.seed_offset],
+        },
+        stream=settings.stream,
+        jpeg_quality=settings.jpeg_quality,
+    )
+
+
+STAR_CAMERA = DeviceKind(
+    name="star_camera",
+    channel=ChannelKind.CAMERA,
+    per_vehicle=build,
+    section="camera",
+    settings=CameraConfig,
+    is_standard=True,
+    pictures=order,
+)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,11 @@ class TableRenderer:
         x_min, x_max, y_min, y_max = bounds_m
         words = np.random.SeedSequence(list(seed))
         return cls(TableView(optics, (x_min, x_max, y_min, y_max), bodies, Light(), words))
+
+    @staticmethod
+    def exposure(fields: dict[str, Any]) -> TableExposure:
+        """The exposure that `dataclasses.asdict` made into `fields`."""
+        return TableExposure(**fields)
 
     def render(self, exposure: TableExposure) -> NDArray[np.uint8]:
         """The picture, shape (height, width, 3), blue-green-red."""

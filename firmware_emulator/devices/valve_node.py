@@ -26,7 +26,7 @@ from drivers.valve_bus.protocol import (
     decode,
     encode,
 )
-from firmware_emulator.faults import Faults
+from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S
 
@@ -49,7 +49,7 @@ class ValveNode:
         vehicle: What its valves push.
         minimum_on_ms: A closed valve is not opened for a shorter pulse.
         float_delay_s: From switching the air until the bearings lift or set down.
-        faults: Valve and bus faults.
+        failures: Valve and bus failures.
         rng: For sensor noise.
         start_ns: Power-up.
     """
@@ -60,13 +60,13 @@ class ValveNode:
         vehicle: Vehicle,
         minimum_on_ms: int,
         float_delay_s: float,
-        faults: Faults,
+        failures: Failures,
         rng: np.random.Generator,
         start_ns: int = 0,
     ) -> None:
         self._index, self._vehicle = index, vehicle
         self._minimum_on_ms, self._float_delay_s = minimum_on_ms, float_delay_s
-        self._faults, self._rng, self._start_ns = faults, rng, start_ns
+        self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self.outbox: list[CanFrame] = []  # what it wants to say now
         # Fifty times a second, and nearly always one of the sixteen counters with nothing else new.
@@ -76,7 +76,7 @@ class ValveNode:
         # Nodes do not power up at the same moment: their cycles are spread over the bus.
         self._status_ns = start_ns + STATUS_NS + index * 1_300_000
         self._slow_ns = start_ns + SLOW_NS + index * 1_300_000 + 600_000
-        self._fault_edges_ns = deque(start_ns + edge_ns for edge_ns in faults.edges_ns("valves"))
+        failures.watch("valves", self._set_valve_failures)
         self._is_armed = self._is_stopped = self._is_dead_man_closed = False
         self._is_air_on = vehicle.is_floating
         self._last_counter: int | None = None
@@ -91,7 +91,7 @@ class ValveNode:
             next_ns = min(next_ns, *self._off_ns.values())
         if self._inbox:
             next_ns = min(next_ns, self._inbox[0][0])
-        return min(next_ns, self._fault_edges_ns[0]) if self._fault_edges_ns else next_ns
+        return next_ns
 
     @property
     def next_output_ns(self) -> int:
@@ -109,16 +109,13 @@ class ValveNode:
 
     def run(self, now_ns: int) -> None:
         """Do what is due at `now_ns`: time-outs first, then what was heard, then speak."""
-        while self._fault_edges_ns and self._fault_edges_ns[0] <= now_ns:
-            self._fault_edges_ns.popleft()
-            self._set_valve_faults(now_ns)
         for valve in [valve for valve, off_ns in self._off_ns.items() if off_ns <= now_ns]:
             self._close([valve], now_ns)
         if self._dead_man_ns <= now_ns:
             self._dead_man_ns = FAR_FUTURE_NS
             self._is_dead_man_closed = True
             self._close(list(self._off_ns), now_ns)
-        is_silent = self._faults.active("silent_bus", now_ns - self._start_ns) is not None
+        is_silent = self._failures.active("silent_bus", now_ns - self._start_ns) is not None
         while self._inbox and self._inbox[0][0] <= now_ns:
             _, frame = self._inbox.popleft()
             if not is_silent:
@@ -178,16 +175,16 @@ class ValveNode:
             del self._off_ns[valve]
             self._vehicle.thrusters.release(now_ns, valve)
 
-    def _set_valve_faults(self, now_ns: int) -> None:
+    def _set_valve_failures(self, now_ns: int) -> None:
         age_ns = now_ns - self._start_ns
-        found = {kind: self._faults.all_active(kind, age_ns) for kind in _STUCK_KINDS}
+        found = {kind: self._failures.all_active(kind, age_ns) for kind in _STUCK_KINDS}
         self._vehicle.advance(now_ns)
-        self._vehicle.thrusters.set_faults(
-            {int(fault.parameters["valve"]) for fault in found["stuck_open_valve"]},
-            {int(fault.parameters["valve"]) for fault in found["stuck_closed_valve"]},
+        self._vehicle.thrusters.set_failures(
+            {int(failure.parameters["valve"]) for failure in found["stuck_open_valve"]},
+            {int(failure.parameters["valve"]) for failure in found["stuck_closed_valve"]},
             {
-                int(fault.parameters["valve"]): fault.parameters["fraction"]
-                for fault in found["leaking_valve"]
+                int(failure.parameters["valve"]): failure.parameters["fraction"]
+                for failure in found["leaking_valve"]
             },
         )
 

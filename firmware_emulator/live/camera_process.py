@@ -1,4 +1,4 @@
-"""Draws the pictures of all star cameras and serves them over HTTP, in a process of its own.
+"""Draws the pictures of all cameras and serves them over HTTP, in a process of its own.
 
 Drawing takes milliseconds of CPU; in the process that paces the serial lines it would delay bytes. The
 parent says on stdin, one JSON line each, first what cameras there are, then every exposure; end of file
@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -20,14 +19,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_emulator.devices.overhead_camera import TableExposure
-from firmware_emulator.devices.sky_renderer import SkyRenderer
-from firmware_emulator.devices.star_camera import Exposure
-from firmware_emulator.devices.table_renderer import TableRenderer
+from firmware_emulator.device_kind import PictureOrder, Renderer
 from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
-from firmware_emulator.sky.sky import SkyFaults
-from firmware_emulator.sky.sky_camera import Shutter
 
 BOUNDARY = "picture"
 NS_PER_S = 1_000_000_000
@@ -44,17 +38,18 @@ class LiveCamera:
         jpeg_quality: For the MJPEG stream.
     """
 
-    def __init__(self, renderer: SkyRenderer | TableRenderer, jpeg_quality: int) -> None:
-        self._render: Callable[[Any], NDArray[np.uint8]] = renderer.render
+    def __init__(self, renderer: Renderer, jpeg_quality: int) -> None:
+        self._renderer = renderer
         self._jpeg_quality = jpeg_quality
         self._changed = threading.Condition()
-        self._orders: deque[Exposure | TableExposure] = deque(maxlen=_MAX_ORDERS)
+        self._orders: deque[Any] = deque(maxlen=_MAX_ORDERS)
         self._newest: tuple[int, int, NDArray[np.uint8]] | None = None
         self._published = 0
         threading.Thread(target=self._work, daemon=True).start()
 
-    def order(self, exposure: Exposure | TableExposure) -> None:
-        """Ask for a picture."""
+    def order(self, fields: dict[str, Any]) -> None:
+        """Ask for the picture of an exposure, given as what `dataclasses.asdict` made of it."""
+        exposure = self._renderer.exposure(fields)
         with self._changed:
             self._orders.append(exposure)
             self._changed.notify_all()
@@ -91,7 +86,7 @@ class LiveCamera:
                 while len(self._orders) > 1 and self._orders[0].arrival_ns < now_ns:
                     self._orders.popleft()  # too slow a machine misses pictures, not the present
                 exposure = self._orders.popleft()
-            image = self._render(exposure)
+            image = self._renderer.render(exposure)
             wait_ns = max(0, exposure.arrival_ns - time.monotonic_ns())
             time.sleep(wait_ns / NS_PER_S)  # real time: a frame leaves when a camera would have sent it
             with self._changed:
@@ -145,7 +140,8 @@ def main(port: int) -> int:
     cameras: dict[str, LiveCamera] = {}
     try:
         for row in json.loads(sys.stdin.readline()):
-            cameras[row["name"]] = LiveCamera(_load(row), row["jpeg_quality"])
+            order = PictureOrder(**row)
+            cameras[order.name] = LiveCamera(order.load(), order.jpeg_quality)
     except SceneError as error:
         print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201 - the answer to the parent
         return 2
@@ -154,28 +150,8 @@ def main(port: int) -> int:
     print(json.dumps({"port": server.server_address[1]}), flush=True)  # noqa: T201 - likewise
     for line in sys.stdin:
         name, fields = json.loads(line)
-        cameras[name].order(_exposure(fields))
+        cameras[name].order(fields)
     return 0
-
-
-def _load(row: dict[str, Any]) -> SkyRenderer | TableRenderer:
-    if "table" in row:
-        return TableRenderer.load(**row["table"])
-    return SkyRenderer.load(
-        row["ceiling"],
-        row["camera"],
-        Shutter(row["exposure_s"], row["readout_s"]),
-        row["sky_seed"],
-        row["camera_seed"],
-    )
-
-
-def _exposure(fields: dict[str, Any]) -> Exposure | TableExposure:
-    """What the parent's dataclass became on the way."""
-    if "paths" in fields:
-        return TableExposure(**fields)
-    faults = fields.pop("sky_faults")
-    return Exposure(**fields, sky_faults=None if faults is None else SkyFaults(**faults))
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from typing import Any
 
-from firmware_emulator.devices.overhead_camera import TableExposure
-from firmware_emulator.devices.star_camera import Exposure
+from firmware_emulator.device_kind import PictureOrder
 from firmware_emulator.live.tcp_server import LOOPBACK
 from firmware_emulator.sky.scene import SceneError
 
@@ -25,8 +25,7 @@ class CameraProcess:
     dropped, and a process that died is started again on the same port without waiting for it.
 
     Args:
-        rows: One table per camera: name and jpeg_quality; of a star camera ceiling, camera, exposure_s,
-            readout_s, sky_seed and camera_seed; of the camera over the table `table`, for its renderer.
+        orders: What is to be drawn, one per camera.
 
     Raises:
         SceneError: A file of a camera cannot be read, or the process did not start.
@@ -36,8 +35,8 @@ class CameraProcess:
         restarts: How often it was started again.
     """
 
-    def __init__(self, rows: Sequence[dict[str, object]]) -> None:
-        self._rows = list(rows)
+    def __init__(self, orders: Sequence[PictureOrder]) -> None:
+        self._rows = [asdict(order) for order in orders]
         self.dropped_orders = 0
         self.restarts = 0
         self._port = 0
@@ -58,7 +57,7 @@ class CameraProcess:
         """Where the pictures of camera `name` are served; `stream` is raw or mjpeg."""
         return f"http://{LOOPBACK}:{self._port}/{name}.{stream}"
 
-    def order(self, name: str, exposure: Exposure | TableExposure) -> None:
+    def order(self, name: str, exposure: Any) -> None:  # noqa: ANN401 - a dataclass of the renderer's
         """Ask for a picture."""
         if not self._say([name, asdict(exposure)]):
             self.dropped_orders += 1

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from drivers.errors import NotFound
 from firmware_emulator.live.server import LiveLaboratory
 from firmware_emulator.sky.scene import SceneError
 
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
         except ValidationError as error:
             return _refuse(f"{options.rig}: {sentence(error)}")
-        except (_BadRig, SceneError) as error:
+        except (_BadRig, SceneError, NotFound) as error:
             return _refuse(str(error))
         except _Ended:
             return 0

@@ -2,10 +2,14 @@
 
 import fcntl
 import os
+import selectors
 import struct
 import termios
 import tty
 from contextlib import suppress
+
+from drivers.laboratory import Address
+from firmware_emulator.live.served import LiveChannel
 
 MAX_UNREAD_BYTES = 3072  # below the line discipline's 4096, behind which bytes pile up that no flush reaches
 
@@ -57,3 +61,36 @@ class PtyPort:
             with suppress(OSError):  # closed before
                 os.close(descriptor)
         self._slave = self._master = -1
+
+
+class PtyServed:
+    """Bytes both ways through a pty."""
+
+    def __init__(self, channel: LiveChannel) -> None:
+        self._pty, self._selector, self._deliver = PtyPort(), channel.selector, channel.deliver
+        self._selector.register(self._pty, selectors.EVENT_READ, self._receive)
+
+    @property
+    def address(self) -> Address:
+        """A device path."""
+        return self._pty.path
+
+    @property
+    def lost(self) -> int:
+        """Bytes for which there was no room."""
+        return self._pty.dropped_bytes
+
+    def send(self, data: bytes) -> None:
+        """Hand bytes to the client."""
+        self._pty.write(data)
+
+    def close(self) -> None:
+        """Give the pty back; may be called twice."""
+        if self._pty.fileno() >= 0:
+            self._selector.unregister(self._pty)
+        self._pty.close()
+
+    def _receive(self) -> None:
+        data = self._pty.read()
+        if data:
+            self._deliver(data)

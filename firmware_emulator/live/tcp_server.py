@@ -51,6 +51,7 @@ class TcpServer:
         selector: Owner of all sockets; its keys carry a `Handler` as data.
         on_bytes: Called with a client and what it sent.
         on_leave: Called when a client has gone.
+        on_join: Called with a new client.
     """
 
     def __init__(
@@ -58,14 +59,20 @@ class TcpServer:
         selector: selectors.BaseSelector,
         on_bytes: Callable[[Client, bytes], None] | None = None,
         on_leave: Callable[[Client], None] | None = None,
+        on_join: Callable[[Client], None] | None = None,
     ) -> None:
         self._selector = selector
-        self._on_bytes, self._on_leave = on_bytes, on_leave
+        self._on_bytes, self._on_leave, self._on_join = on_bytes, on_leave, on_join
         self._listener = socket.create_server((LOOPBACK, 0))
         self._listener.setblocking(False)
         self.port: int = self._listener.getsockname()[1]
         self.clients: list[Client] = []
         selector.register(self._listener, selectors.EVENT_READ, self._accept)
+
+    @property
+    def dropped_messages(self) -> int:
+        """Messages that present clients missed because they did not read."""
+        return sum(client.dropped_messages for client in self.clients)
 
     @property
     def url(self) -> str:
@@ -105,6 +112,8 @@ class TcpServer:
         client = Client(connection)
         self.clients.append(client)
         self._selector.register(connection, selectors.EVENT_READ, lambda: self._serve(client))
+        if self._on_join:
+            self._on_join(client)
 
     def _serve(self, client: Client) -> None:
         try:

@@ -99,3 +99,23 @@ class Contacts:
         self._busy_until_ns[key] = now_ns + SQUEEZE_NS
         self.count += 1
         return True
+
+
+class ContactWatch:
+    """Looks for contacts as often as they can happen.
+
+    Args:
+        vehicles: All that can touch, at one time.
+        contacts: Pushes them apart.
+    """
+
+    def __init__(self, vehicles: Sequence[Vehicle], contacts: Contacts) -> None:
+        self._vehicles, self._contacts = vehicles, contacts
+        self.next_ns = 0
+        self.run(vehicles[0].now_ns)
+
+    def run(self, now_ns: int) -> None:
+        """Bring all vehicles to `now_ns` and push apart what touches."""
+        for vehicle in self._vehicles:
+            vehicle.advance(now_ns)
+        self.next_ns = self._contacts.resolve(self._vehicles)

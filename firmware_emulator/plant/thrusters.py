@@ -138,8 +138,8 @@ class ThrusterBank:
             self._closes_ns[valve] = now_ns + round(self.timing.close_s * NS_PER_S)
         self._schedule()
 
-    def set_faults(self, stuck_open: set[int], stuck_closed: set[int], leaks: dict[int, float]) -> None:
-        """Replace the mechanical faults; `leaks` maps a valve to the fraction of thrust it loses closed."""
+    def set_failures(self, stuck_open: set[int], stuck_closed: set[int], leaks: dict[int, float]) -> None:
+        """Replace the mechanical failures; `leaks` maps a valve to the fraction of thrust it loses closed."""
         self._stuck_open, self._stuck_closed = set(stuck_open), set(stuck_closed)
         self._leaks = [leaks.get(valve, 0.0) for valve in range(len(self._leaks))]
         self._targets.clear()

@@ -1,6 +1,6 @@
 """The ceiling and its lights: LEDs that may die, lights that no catalogue knows, lamps' soft glow.
 
-One sky hangs over all mock-ups of a laboratory; their cameras share this object, which faults change.
+One sky hangs over all mock-ups of a laboratory; their cameras share this object, which failures change.
 """
 
 from collections.abc import Iterable
@@ -34,7 +34,7 @@ class Glow:
 
 
 @dataclass(frozen=True, slots=True)
-class SkyFaults:
+class SkyFailures:
     """What differs from the list of LEDs in one picture.
 
     Attributes:
@@ -58,7 +58,7 @@ class Sky:
         glows: Soft patches.
 
     Attributes:
-        is_dead: bool (n,), which LEDs are dark. Faults write here.
+        is_dead: bool (n,), which LEDs are dark. Failures write here.
         ambient: Diffuse light of the ceiling, relative to normal; 0 is a dark room.
 
     Raises:
@@ -116,7 +116,7 @@ class Sky:
         self._false_xy_m, self._false_brightness = np.empty((0, 2)), np.empty(0)
 
     def lights(
-        self, stray_per_m2: float = 0.0, *, is_dark: bool = False, faults: SkyFaults | None = None
+        self, stray_per_m2: float = 0.0, *, is_dark: bool = False, failures: SkyFailures | None = None
     ) -> tuple[Floats, Floats]:
         """All that shines as points.
 
@@ -124,7 +124,7 @@ class Sky:
             stray_per_m2: Add stray lights of this density. They hang at fixed places, drawn once, and a
                 higher density keeps those of a lower one.
             is_dark: The LEDs are switched off; false and stray lights are not.
-            faults: LEDs that differ from the list; numbers that no LED has are nobody's.
+            failures: LEDs that differ from the list; numbers that no LED has are nobody's.
 
         Returns:
             Places (m, 2) and relative brightness (m,).
@@ -132,10 +132,10 @@ class Sky:
         shines = np.zeros_like(self.is_dead) if is_dark else ~self.is_dead
         stray = min(_STRAY_RESERVE, round(stray_per_m2 * self._area_m2))
         leds_xy_m, new_xy_m = self.leds_xy_m, np.empty((0, 2))
-        if faults is not None:
-            shines[[led for led in faults.dead if led < len(shines)]] = False
-            leds_xy_m, new_xy_m = leds_xy_m.copy(), np.array(faults.new, dtype=float).reshape(-1, 2)
-            for led, dx_m, dy_m in faults.moved:
+        if failures is not None:
+            shines[[led for led in failures.dead if led < len(shines)]] = False
+            leds_xy_m, new_xy_m = leds_xy_m.copy(), np.array(failures.new, dtype=float).reshape(-1, 2)
+            for led, dx_m, dy_m in failures.moved:
                 leds_xy_m[led : led + 1] += (dx_m, dy_m)
         places = (leds_xy_m[shines], self._false_xy_m, new_xy_m, self._stray_xy_m[:stray])
         brightness = (

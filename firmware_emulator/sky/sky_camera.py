@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from firmware_emulator.sky.optics import CameraOptics, Floats
 from firmware_emulator.sky.sensor import Sensor, SensorSettings
-from firmware_emulator.sky.sky import Sky, SkyFaults
+from firmware_emulator.sky.sky import Sky, SkyFailures
 from firmware_emulator.sky.spots import add_spots, steps_of
 
 Pose = tuple[float, float, float]
@@ -77,7 +77,7 @@ class SkyCamera:
         sequence: int,
         is_sky_dead: bool = False,
         false_lights: float = 0.0,
-        sky_faults: SkyFaults | None = None,
+        sky_failures: SkyFailures | None = None,
     ) -> NDArray[np.uint8]:
         """One picture.
 
@@ -88,7 +88,7 @@ class SkyCamera:
             sequence: Number of the frame; decides its noise.
             is_sky_dead: The LEDs are switched off.
             false_lights: How many stray lights a view of this size holds on average.
-            sky_faults: LEDs that differ from the list.
+            sky_failures: LEDs that differ from the list.
 
         Returns:
             uint8 (height, width). The pose it belongs to is that of half the time from `start` to `end`.
@@ -102,7 +102,7 @@ class SkyCamera:
         path[1, 2] = path[0, 2] + np.remainder(path[1, 2] - path[0, 2] + np.pi, 2.0 * np.pi) - np.pi
         light_dn = self._diffuse(path.mean(axis=0))
         xy_m, brightness = self.sky.lights(
-            false_lights / self._footprint_m2, is_dark=is_sky_dead, faults=sky_faults
+            false_lights / self._footprint_m2, is_dark=is_sky_dead, failures=sky_failures
         )
         self._add_lights(light_dn, path, xy_m, brightness)
         return self.sensor.expose(light_dn, sequence)

@@ -53,6 +53,8 @@ def _ros_type(annotation: object) -> str:
 
 def _parse(name: str, ros_type: str) -> _Field:
     base, bracket, rest = ros_type.partition("[")
+    if base != "string" and base not in _PRIMITIVES:
+        raise TypeError(f"{name}: {ros_type!r} is no type that a payload can have")
     count = 1 if not bracket else int(rest[:-1] or 0)
     return _Field(name, base, count)
 

@@ -141,12 +141,11 @@ def read_batch(data: bytes) -> Iterator[Recorded]:
         causes = np.frombuffer(data, CAUSE, cause_count, position).tolist()
         position += cause_count * CAUSE.itemsize
         rows = entries.tolist()
-        largest = max(name_count, 1)
         if (
             position + int(entries["size"].sum()) != len(data)
             or int(entries["causes"].sum()) != cause_count
-            or any(entries[field].max(initial=0) >= largest for field in ("noun", "owner"))
-            or any(noun >= largest or owner >= largest for noun, owner, _ in causes)
+            or any((entries[field] >= name_count).any() for field in ("noun", "owner"))
+            or any(noun >= name_count or owner >= name_count for noun, owner, _ in causes)
         ):
             raise BatchError("a batch of the record stream is cut off")
     except (struct.error, ValueError) as error:

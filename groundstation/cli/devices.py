@@ -11,7 +11,7 @@ from rich.table import Table
 from serial.tools import list_ports
 
 from drivers.imu_block.identify import BAUDS, LISTEN_S, PortReport, ask_url
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.parts.imu.sections import ImuOfVehicle
 from groundstation.rig.read import load_rig
 

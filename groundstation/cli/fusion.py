@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from time import monotonic
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from groundstation.cli.errors import UsageError
-from groundstation.cli.fusion_folder import FusionFolder, read_folder, write_atomically
+from groundstation.cli.progress import progress_line
+from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.declarations.errors import UsageError
+from groundstation.files.writing import write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Estimator, FixAccount, PlanarState
+from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.registry import ESTIMATORS
-from groundstation.fusion.slope_grid import SlopeGrid, noise_with
-from groundstation.fusion.stamp_ticks import StampTicks
-from groundstation.fusion.table_map import TableMap, TableMapError
-from groundstation.runtime.estimation import slope_grid
+from groundstation.fusion.slope_grid import noise_with, slope_grid
+from groundstation.fusion.table_map import TableMap
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
 
@@ -70,11 +69,12 @@ def run(
         raise UsageError(f"--table-map works on the filter, not on --method {method}.")
     data = read_folder(folder)
     estimator = _estimator(data.noise, method, table_map, smooth=smooth)
-    states, accounts = estimate(data, estimator)
+    with progress_line() as progress:
+        states, accounts = estimate(data, estimator, partial(progress, "estimating"))
     if isinstance(estimator, OfflineSmoother):
         later = iter(estimator.states())
         states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0]]
-    write_atomically(
+    write_files(
         {
             out: _estimate_lines(data, states),
             out.with_name("fixes.csv"): _fix_lines(accounts),
@@ -86,86 +86,14 @@ def run(
 def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth: bool) -> Estimator:
     known = None
     if table_map is not None:
-        known = _read_map(table_map)
+        known = slope_grid(TableMap.load(table_map))
         noise = noise_with(noise, known)
     if smooth:
         return OfflineSmoother(noise, known)
     return ErrorStateFilter(noise, table_map=known) if known else ESTIMATORS[method](noise)
 
 
-def _read_map(path: Path) -> SlopeGrid:
-    try:
-        return slope_grid(TableMap.load(path))
-    except TableMapError as error:
-        raise UsageError(f"{error}.") from None
-
-
-def estimate(data: FusionFolder, estimator: Estimator) -> tuple[list[PlanarState | None], list[FixAccount]]:
-    """Feed a data set to an estimator in the order in which it arrived.
-
-    Returns:
-        A state (or None) for each packet, and the account of every fix in order of arrival.
-    """
-    period = data.noise.packet_period_s
-    ticks = StampTicks(period)
-    variance = [
-        data.noise.star_sigma_xy_m**2,
-        data.noise.star_sigma_xy_m**2,
-        data.noise.star_sigma_heading_rad**2,
-    ]
-    cov = np.diag(variance)
-    stars, next_fix = data.stars.tolist(), 0
-    accounts: list[FixAccount] = []
-    states: list[PlanarState | None] = []
-    resting = data.run_start_s > 0.0
-    if resting:
-        estimator.begin_rest(0)
-    began, progress = monotonic(), sys.stderr.isatty()
-    rows = data.imu.tolist()
-    for number, (t, omega, ax, ay, temperature) in enumerate(rows):
-        while next_fix < len(stars) and stars[next_fix][1] <= t:
-            accounts.append(_add_fix(estimator, stars[next_fix], cov))
-            next_fix += 1
-        if resting and t > data.run_start_s:
-            estimator.end_rest(round(data.run_start_s * NS))
-            resting = False
-        if t - t != 0.0:
-            estimator.counters.add("packet_stamp_not_finite")
-            states.append(None)
-            continue
-        packet = ImuPacket(round(t * NS), ticks.elapsed_s(t), omega, ax, ay, temperature)
-        states.append(estimator.add_imu(packet))
-        if progress and number % 20000 == 19999 and monotonic() - began > PROGRESS_AFTER_S:
-            sys.stderr.write(f"\r{100 * number // len(rows)} % ")
-    for row in stars[next_fix:]:
-        estimator.counters.add("fix_after_the_last_packet")
-        accounts.append(_refused(row, "arrived after the last packet"))
-    return states, _merge(accounts, estimator.settled())
-
-
-def _add_fix(estimator: Estimator, row: list[float], cov: np.ndarray) -> FixAccount:
-    exposure, arrival, x, y, heading = row
-    if exposure - exposure != 0.0:
-        estimator.counters.add("fix_stamp_not_finite")
-        return _refused([0.0, *row[1:]], "not finite")
-    return estimator.add_fix(Fix(round(exposure * NS), round(arrival * NS), x, y, heading, cov))
-
-
-def _refused(row: list[float], reason: str) -> FixAccount:
-    stamp = round(row[0] * NS) if math.isfinite(row[0]) else 0
-    return FixAccount(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
-
-
-def _merge(accounts: list[FixAccount], settled: list[FixAccount]) -> list[FixAccount]:
-    """Replace the account of a fix that waited by the one given when it was settled."""
-    later = {account.t_exposure_ns: account for account in settled}
-    return [
-        later.pop(account.t_exposure_ns, account) if account.reason.startswith("waits") else account
-        for account in accounts
-    ]
-
-
-def _estimate_lines(data: FusionFolder, states: list[PlanarState | None]) -> Iterator[str]:
+def _estimate_lines(data: FlightData, states: list[PlanarState | None]) -> Iterator[str]:
     yield ESTIMATE_HEADER
     empty = ",nan" * 12 + "\n"
     form = ",%.7f,%.7f,%.7f,%.7f,%.7f,%.7f,%.8f,%.8f,%.8f,%.7f,%.7f,%.8f\n"

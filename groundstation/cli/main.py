@@ -5,20 +5,16 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from groundstation.cli.command import Command, Group
+from groundstation.cli.extensions import BrokenCommandError, Row, extension, extensions
 
 if TYPE_CHECKING:
     import typer
 
-
-class Command(NamedTuple):
-    """Where a sub-command lives, and the line that the overview shows."""
-
-    target: str
-    summary: str
-
-
-COMMANDS = {
+COMMANDS: dict[str, Row] = {
     "run": Command("groundstation.cli.run:app", "Fly the vehicles of a rig."),
     "replay": Command(
         "groundstation.cli.replay:app", "Feed a recording through the nodes again and compare."
@@ -28,19 +24,37 @@ COMMANDS = {
     "request": Command(
         "groundstation.cli.request:app", "Ask something of a running vehicle: arm, stop, go_to."
     ),
+    "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
-    "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames; surveys."),
+    "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
-    "calibrate": Command("groundstation.cli.calibrate:app", "From recordings to calibration numbers."),
 }
+ALIASES = {
+    ("star-tracker", "survey"): ("calibrate", "survey"),
+    ("star-tracker", "intrinsics"): ("calibrate", "lens"),
+    ("star-tracker", "board"): ("calibrate", "board"),
+    ("star-tracker", "mount"): ("calibrate", "mount"),
+    ("star-tracker", "delay"): ("calibrate", "delay"),
+    ("star-tracker", "amend"): ("calibrate", "amend"),
+    ("star-tracker", "overhead-pose"): ("calibrate", "overhead"),
+}
+"""Spellings of before that go on working."""
 
 
-def build(called: str | None) -> typer.Typer:
-    """The command line: the sub-command that is called is imported, of the others only the summary shows.
+def spelled(words: list[str]) -> list[str]:
+    """Return what is called in its spelling of today."""
+    return [*ALIASES.get((words[0], words[1]), words[:2]), *words[2:]] if len(words) > 1 else words
+
+
+def build(words: list[str]) -> typer.Typer:
+    """The command line: the command that is called is imported, of the others only the summary shows.
 
     Args:
-        called: Name of the sub-command, None or unknown for the overview.
+        words: What is called; the name of a command first, anything else gives the overview.
+
+    Raises:
+        BrokenCommandError: The command is of an installed package and cannot be loaded.
     """
     import typer  # here, so that Ctrl-C is understood before anything heavy is loaded
 
@@ -53,23 +67,65 @@ def build(called: str | None) -> typer.Typer:
         Example: groundstation run examples/rigs/two_mock_ups.toml
         """
 
-    for name, row in COMMANDS.items():
-        if name != called:
-            app.command(name, help=row.summary)(_not_called)
-            continue
-        module, _, attribute = row.target.partition(":")
-        found: typer.Typer = getattr(importlib.import_module(module), attribute)
-        if (
-            len(found.registered_commands) == 1
-            and not found.registered_groups
-            and not found.registered_callback
-        ):
-            only = found.registered_commands[0]
-            only.name = name
-            app.registered_commands.append(only)
+    called = words[0] if words else ""
+    if called in COMMANDS:
+        rows = {called: COMMANDS[called]}
+    else:
+        found = extension(called)
+        rows = extensions() | COMMANDS if found is None else {called: found}
+    for name, row in rows.items():
+        if name == called:
+            _add(app, name, row, words[1:])
         else:
-            app.add_typer(found, name=name, help=row.summary)
+            app.command(name, help=row.summary)(_not_called)
     return app
+
+
+def _add(app: typer.Typer, name: str, row: Row, words: list[str]) -> None:
+    """Put a command that is called on the command line; of a group only the member that is called."""
+    import typer
+
+    if isinstance(row, Group):
+        group = typer.Typer(
+            no_args_is_help=True,
+            add_completion=False,
+            rich_markup_mode=None,
+            help=f"{row.summary}\n\nExample: {row.example}",
+            callback=_root,
+        )
+        for member, command in row.members.items():
+            if words and member == words[0]:
+                _add(group, member, command, words[1:])
+            else:
+                group.command(member, help=command.summary)(_not_called)
+        app.add_typer(group, name=name)
+        return
+    found = _load(row)
+    if not isinstance(found, typer.Typer):
+        app.command(name)(found)
+    elif (
+        len(found.registered_commands) == 1 and not found.registered_groups and not found.registered_callback
+    ):
+        only = found.registered_commands[0]
+        only.name = name
+        app.registered_commands.append(only)
+    else:
+        app.add_typer(found, name=name)
+
+
+def _load(row: Command) -> typer.Typer | Callable[..., Any]:
+    module, _, attribute = row.target.partition(":")
+    try:
+        found: typer.Typer | Callable[..., Any] = getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # whatever somebody's package raises while it is imported
+        if module.startswith("groundstation."):
+            raise
+        raise BrokenCommandError(f"{row.target} cannot be loaded ({error}).") from error
+    return found
+
+
+def _root() -> None:
+    """Make a group of a typer with a single command."""
 
 
 def _not_called() -> None:
@@ -79,18 +135,20 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
+    from groundstation.core.library import CoreError
     from groundstation.declarations.errors import GroundStationError, UsageError
-    from groundstation.files.errors import CalibrationFileError
+    from groundstation.files.errors import FileError
     from groundstation.recording.errors import RecordingError
 
+    words = spelled(words)
     try:
-        build(words[0] if words else None)(words, prog_name="groundstation")
+        build(words)(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
-    except (UsageError, DeviceError, RecordingError, CalibrationFileError) as error:
+    except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 2
-    except GroundStationError as error:
+    except (GroundStationError, CoreError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return 1
     return 0
@@ -99,6 +157,8 @@ def call(words: list[str]) -> int:
 def main() -> None:
     """Entry point."""
     words = sys.argv[1:]
+    if words[:1] == ["run"]:  # before NumPy loads: a run forks its processes, and threads are not forked
+        os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
     try:
         code = call(words)
     except KeyboardInterrupt:  # before a command took the signal over: nothing had been started yet

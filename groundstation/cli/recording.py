@@ -11,7 +11,7 @@ from rich.table import Table
 
 from groundstation.bus.envelope import Cause
 from groundstation.cli import recording_pictures
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.recording.causes import CauseIndex
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo

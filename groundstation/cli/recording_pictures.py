@@ -10,8 +10,9 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import whole_folder, write_picture
+from groundstation.declarations.errors import UsageError
+from groundstation.files.png import write_png
+from groundstation.files.writing import whole_folder
 from groundstation.parts.stars.messages import StarMatches, StarPicture
 from groundstation.parts.stars.star_answers import notes_of
 from groundstation.recording.errors import RecordingError
@@ -81,9 +82,9 @@ def pictures(
                 name = f"{found.vehicle}_{since_s:09.3f}s"
                 verdict = found.reason or "fix"
                 caption = f"{found.vehicle}, {since_s:.3f} s: {verdict}"
-                write_picture(folder / f"{name}.png", draw_notes(found.image, found.notes, caption))
+                write_png(folder / f"{name}.png", draw_notes(found.image, found.notes, caption))
                 if raw:
-                    write_picture(folder / f"{name}_raw.png", found.image)
+                    write_png(folder / f"{name}_raw.png", found.image)
                 print(f"{name}.png: {verdict}")
                 count += 1
             policy = recording.info.images.value

@@ -9,10 +9,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig import Rig
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.parts.table import installed_tables
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
@@ -102,9 +102,7 @@ def _factory(rig: Rig) -> Callable[[str], Node]:
     def make(key: str) -> Node:
         try:
             return make_node(rig, key)
-        except KeyError:
-            raise UsageError(f"the rig {rig.name!r} has no node {key!r}") from None
-        except CalibrationFileError as error:
+        except FileError as error:
             raise UsageError(f"{key} cannot be made: {error}") from error
 
     return make

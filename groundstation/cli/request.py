@@ -6,16 +6,20 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.request import Action, Argument, ArgumentError
 from groundstation.launch.asking import ask
-from groundstation.launch.running import RunningRig, find_running
+from groundstation.launch.running import choose_run
 from groundstation.parts.table import installed_tables
 
 # "-0.2" is a number and no option
 _NUMBERS = {"ignore_unknown_options": True}
 
 app = typer.Typer(rich_markup_mode=None)
+
+
+def _shown(argument: Argument) -> str:
+    return argument.name.replace("_rad", "_deg")
 
 
 def _described() -> str:
@@ -51,17 +55,13 @@ def request(
         given = row.check(_values(row, words))
     except ArgumentError as error:
         raise UsageError(str(error)) from error
-    run = _choose(find_running(), vehicle, pid)
+    run = choose_run(vehicle, pid)
     ack = ask(run.endpoint, vehicle, action, given, getpass.getuser(), timeout)
     asked = " ".join([action, *words])
     verdict = "accepted" if ack.accepted else f"refused: {ack.reason}"
     print(f"{vehicle} ({run.rig}): {asked}: {verdict}")
     if not ack.accepted:
         raise typer.Exit(1)
-
-
-def _shown(argument: Argument) -> str:
-    return argument.name.replace("_rad", "_deg")
 
 
 def _values(row: Action, words: list[str]) -> dict[str, object]:
@@ -91,20 +91,3 @@ def _value(argument: Argument, name: str, word: str) -> object:
     except ValueError:
         raise ArgumentError(f"{name} is {word!r}, expected a number") from None
     return math.radians(number) if name.endswith("_deg") else number
-
-
-def _choose(runs: list[RunningRig], vehicle: str, pid: int | None) -> RunningRig:
-    """The run that is meant."""
-    if pid is not None:
-        runs = [run for run in runs if run.pid == pid]
-    if not runs:
-        whose = "" if pid is None else f" with process {pid}"
-        raise UsageError(f"no rig is running{whose}: start one with `groundstation run`")
-    fitting = [run for run in runs if vehicle in run.vehicles]
-    if not fitting:
-        known = ", ".join(name for run in runs for name in run.vehicles)
-        raise UsageError(f"no vehicle {vehicle!r} is running (running: {known})")
-    if len(fitting) > 1:
-        known = ", ".join(f"{run.pid} ({run.rig})" for run in fitting)
-        raise UsageError(f"several rigs fly a {vehicle!r}: choose one with --pid: {known}")
-    return fitting[0]

@@ -12,10 +12,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from groundstation.cli.errors import UsageError
-from groundstation.cli.report import print_report
 from groundstation.cli.terminal_view import TerminalView
-from groundstation.declarations.errors import GroundStationError
+from groundstation.core.library import default_core
+from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.recording.writer import PART_SUFFIX
@@ -47,6 +46,7 @@ def run(
 
     Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
+    default_core()  # before any process starts: what it lacks, all of them would
     text = read_text(rig)
     loaded = parse_rig(text, rig)
     if record is not None and record.exists():
@@ -68,6 +68,8 @@ def run(
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
+        from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
+
         print_report(finished[-1], report)
 
 

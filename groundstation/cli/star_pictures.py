@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.cli.star_files import write_picture
+from groundstation.files.png import write_png
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
@@ -35,7 +35,7 @@ class PictureFolder:
         """Write the picture if it is wanted.
 
         Raises:
-            UsageError: The file cannot be written.
+            FileError: The file cannot be written.
         """
         if not (self.every or isinstance(answer, NoFix)):
             return
@@ -47,4 +47,4 @@ class PictureFolder:
                 f"{name}: {answer.stars} stars, ({1e3 * answer.x_m:.2f}, {1e3 * answer.y_m:.2f}) mm, "
                 f"{np.degrees(answer.heading_rad):.3f} deg"
             )
-        write_picture(self.folder / f"{name}.png", draw_notes(image, notes, caption))
+        write_png(self.folder / f"{name}.png", draw_notes(image, notes, caption))

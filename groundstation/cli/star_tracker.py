@@ -1,8 +1,6 @@
-"""``groundstation star-tracker``: star fixes from frames in a folder, and the sky's calibrations."""
+"""``groundstation star-tracker``: star fixes from frames in a folder."""
 
-import csv
 import gc
-import io
 import math
 import time
 from collections.abc import Callable
@@ -16,18 +14,13 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from groundstation.cli import star_amend, star_calibration, star_overhead, star_survey
-from groundstation.cli.errors import UsageError
-from groundstation.cli.star_files import (
-    check_targets,
-    find_frames,
-    read_frame,
-    whole_folder,
-    with_progress,
-    write_atomically,
-)
+from groundstation.cli.overhead import overhead
+from groundstation.cli.progress import with_progress
 from groundstation.cli.star_pictures import PictureFolder
-from groundstation.files.errors import CalibrationFileError
+from groundstation.data_sets.star_folder import find_frames, load_sky, read_frame
+from groundstation.declarations.errors import UsageError
+from groundstation.files.tables import csv_text
+from groundstation.files.writing import check_targets, whole_folder, write_file
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
 from groundstation.star_tracking.fixes import NoFix, StarFix
@@ -35,9 +28,7 @@ from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
-app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Star fixes from pictures of a ceiling of LEDs."
-)
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 COLUMNS = (
     "frame",
@@ -63,7 +54,10 @@ class Method(StrEnum):
 
 @app.callback()
 def _root() -> None:
-    """Star fixes from pictures of a ceiling of LEDs, and the calibrations of that sky."""
+    """Star fixes from pictures of a ceiling of LEDs, and mock-ups from above.
+
+    The sky is calibrated by `groundstation calibrate`: survey, lens, board, mount, delay, amend.
+    """
 
 
 def solve(
@@ -79,8 +73,7 @@ def solve(
 ) -> None:
     """Solve every frame of a folder on its own, lost in space.
 
-    Example:
-      groundstation star-tracker solve recordings/ceiling --out answers.csv
+    Example: groundstation star-tracker solve recordings/ceiling --out answers.csv
     """
     cv2.setNumThreads(1)
     check_targets(out)
@@ -90,9 +83,7 @@ def solve(
         raise UsageError("--every-picture needs --pictures, the folder for them.")
     solver = _solver(method, camera, catalogue)
     solver(read_frame(frames[0], camera))  # the first call pays for memory and lazy imports
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows = []
     with ExitStack() as stack:
         gc.freeze()  # else the collector now and then looks at every loaded module: 20 ms in a frame's time
         stack.callback(gc.unfreeze)
@@ -105,24 +96,10 @@ def solve(
             image = read_frame(path, camera)
             begin = time.process_time()
             answer = solver(image)
-            writer.writerow(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))
+            rows.append(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))
             if drawn is not None:
                 drawn.note(path.stem, image, answer)
-        write_atomically(out, buffer.getvalue())
-
-
-def load_sky(folder: Path) -> tuple[CameraCalibration, StarCatalogue]:
-    """Read camera.json and ceiling.csv of a folder.
-
-    Raises:
-        UsageError: One of them is missing or wrong.
-    """
-    if not folder.is_dir():
-        raise UsageError(f"{folder}: no such folder.")
-    try:
-        return CameraCalibration.load(folder / "camera.json"), StarCatalogue.load(folder / "ceiling.csv")
-    except CalibrationFileError as error:
-        raise UsageError(str(error)) from error
+        write_file(out, csv_text(COLUMNS, rows))
 
 
 def _solver(
@@ -154,11 +131,4 @@ def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
 
 
 app.command()(solve)
-app.command()(star_calibration.intrinsics)
-app.command()(star_calibration.board)
-app.command()(star_calibration.mount)
-app.command()(star_calibration.delay)
-app.command()(star_survey.survey)
-app.command()(star_amend.amend)
-app.command()(star_overhead.overhead)
-app.command("overhead-pose")(star_overhead.overhead_pose)
+app.command()(overhead)

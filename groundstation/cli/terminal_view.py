@@ -12,6 +12,7 @@ from rich import box
 from rich.console import Console, Group
 from rich.live import Live
 from rich.panel import Panel
+from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
@@ -51,6 +52,8 @@ class TerminalView:
         self._console = console
         self._live: Live | None = None
         self._waited_for = ""
+        self._lower_shows: object = None
+        self._rendered = Segments([])
 
     @contextmanager
     def opened(self, *, headless: bool) -> Iterator[None]:
@@ -103,16 +106,11 @@ class TerminalView:
             Text.assemble((run.rig.name, "bold"), "  ", status),
             Text(f"{minutes}:{seconds:02d}   Ctrl-C ends", style=_DIM),
         )
-        lower = Table.grid(expand=True, padding=(0, 3))
-        lower.add_column()
-        lower.add_column()
-        lower.add_column(ratio=1)
-        lower.add_row(self._ages(), self._processes(), self._ports())
         events = Text("\n".join(run.monitor.lines) or "starting ...", no_wrap=True, overflow="ellipsis")
         return Group(
             title,
             *self._vehicles(),
-            lower,
+            self._lower(),
             Panel(events, title="events", title_align="left", border_style=_DIM, padding=(0, 1)),
         )
 
@@ -130,6 +128,26 @@ class TerminalView:
             for label, *cells in zip(labels, *columns, strict=True):
                 table.add_row(label, *map(text_of, cells))
             yield table
+
+    def _lower(self) -> Segments:
+        """Ages, processes and ports, rendered anew only when they change: laying out tables is what costs."""
+        run = self._run
+        shown = (
+            self._console.width,
+            tuple(run.monitor.latency.items()),
+            tuple((child.name, child.state, child.restarts) for child in run.launcher.children),
+            tuple(run.monitor.health.ports.items()),
+        )
+        if shown != self._lower_shows:
+            self._lower_shows = shown
+            lower = Table.grid(expand=True, padding=(0, 3))
+            lower.add_column()
+            lower.add_column()
+            lower.add_column(ratio=1)
+            lower.add_row(self._ages(), self._processes(), self._ports())
+            lines = self._console.render_lines(lower)
+            self._rendered = Segments([piece for line in lines for piece in (*line, Segment.line())])
+        return self._rendered
 
     def _ages(self) -> Table:
         table = _small("age of the light, p50 / p99 ms")

@@ -91,17 +91,20 @@ def controllers() -> Mapping[str, ControllerRow[Any]]:
         ControllerError: One of an installed package cannot be loaded, or takes a name that is in use.
     """
     rows = {name: replace(row, is_built_in=True) for name, row in _BUILT_IN.items()}
-    for point in entry_points(group=ENTRY_POINT_GROUP):
+    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
         if point.name in rows:
-            raise ControllerError(
-                f"the controller {point.name!r} ({point.value}) takes a name that is in use"
-            )
+            raise ControllerError(f"{_where(point)} takes a name that is in use")
         rows[point.name] = _load(point)
     return MappingProxyType(rows)
 
 
+def _where(point: EntryPoint) -> str:
+    package = point.dist.name if point.dist is not None else point.module
+    return f"the controller {point.name!r} of the package {package} ({point.value})"
+
+
 def _load(point: EntryPoint) -> ControllerRow[Any]:
-    where = f"the controller {point.name!r} ({point.value})"
+    where = _where(point)
     try:
         row = point.load()
     except Exception as error:  # whatever a package of somebody else raises: it is named, once

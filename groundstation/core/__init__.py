@@ -1,6 +1,7 @@
-"""The compiled core: what has to be fast, in plain C, with an equal answer in NumPy beside it.
+"""The compiled core: what has to be fast, in plain C.
 
-One C file holds one concept; all of them make one small library without dependencies, which ``library``
-loads by ctypes and ``build`` compiles at installation. Without it (no compiler, stale) the callers use
-their NumPy code. The callers live with their mathematics and own the buffers; nothing in C allocates.
+One C file holds one concept; ``api.h`` declares what Python sees of them, once for both languages. They make
+one small library without dependencies; ``build`` compiles it at installation, ``library`` loads it by cffi.
+The callers live with their mathematics and own the buffers; nothing in C allocates. An equal of every piece
+in NumPy stands in ``tests/oracles``.
 """

@@ -1,24 +1,20 @@
-"""Compile the core: at installation, by ``make``, and in tests with sanitizers.
+"""Compile the core, and read its header for Python: at installation, by ``make``, and in tests.
 
-Needs the machine's C compiler (``CC`` or ``cc``) and nothing else; takes a few seconds.
+Needs a C compiler: what ``CC`` names, else ``cc``, else ``ziglang`` from the package index.
 """
 
-import hashlib
+import importlib.util
 import os
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
-FOLDER = Path(__file__).parent
-LIBRARY = FOLDER / "_core.so"
-# No -march: the library runs on every machine of its kind, and loops that gain by AVX2 carry a clone.
-# No contraction, no fast-math: the same sums in the same order on every machine.
-FLAGS = (
-    *("-std=c11", "-O3", "-fPIC", "-shared", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math"),
-    *("-ffp-contract=off", "-Wall", "-Wextra"),
-)
+from groundstation.core import sources
+from groundstation.core.sources import FLAGS, INTERFACE, LIBRARY
+
 SANITIZERS = (
     "-g",
     "-O1",
@@ -26,56 +22,67 @@ SANITIZERS = (
     "-fsanitize=address,undefined",
     "-fno-sanitize-recover=all",
 )
+# zig aims at the very machine it runs on unless told otherwise.
+_ZIG = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
 
 
 class CoreBuildError(RuntimeError):
     """The core could not be compiled; the text says why in one sentence."""
 
 
-def sources() -> list[Path]:
-    """All sources of the core, in a fixed order."""
-    return sorted([*FOLDER.glob("*.c"), *FOLDER.glob("*.h")])
+def compiler() -> tuple[str, ...]:
+    """The command that compiles C here.
+
+    Raises:
+        CoreBuildError: There is none.
+    """
+    named = os.environ.get("CC")
+    command = tuple(shlex.split(named or "cc"))
+    if shutil.which(command[0]):
+        return command
+    if named:
+        raise CoreBuildError(f"no C compiler: CC names {command[0]!r}, which is not installed")
+    if importlib.util.find_spec("ziglang"):
+        return _ZIG
+    raise CoreBuildError(
+        "no C compiler: install cc, name one by CC, or pip install -r tools/requirements-zig.lock"
+    )
 
 
-def sources_sha256() -> str:
-    """Hash of all sources and flags: what a library must have been made of."""
-    digest = hashlib.sha256(" ".join(FLAGS).encode())
-    for path in sources():
-        content = path.read_bytes()
-        digest.update(f"\n{path.name} {len(content)}\n".encode())
-        digest.update(content)
-    return digest.hexdigest()
-
-
-def is_fresh(library: Path = LIBRARY) -> bool:
-    """Whether the library is there and was made of the present sources."""
-    return library.exists() and sources_sha256().encode() in library.read_bytes()
-
-
-def compile_core(library: Path = LIBRARY, extra_flags: tuple[str, ...] = ()) -> Path:
-    """Compile all sources to ``library``; a library in use is replaced as a whole, never rewritten.
+def compile_core(folder: Path, extra_flags: tuple[str, ...] = ()) -> Path:
+    """Build into ``folder``; a library in use is replaced as a whole, never rewritten.
 
     Raises:
         CoreBuildError: There is no compiler, or it refused.
     """
-    command = shlex.split(os.environ.get("CC", "cc"))
-    if shutil.which(command[0]) is None:
-        raise CoreBuildError(f"no C compiler: {command[0]!r} is not installed (set CC to name another)")
-    sha256 = sources_sha256()
-    files = [str(path) for path in sources() if path.suffix == ".c"]
-    handle, partial = tempfile.mkstemp(suffix=".so", dir=library.parent)
-    os.close(handle)
-    try:
+    command = compiler()
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [str(path) for path in sources.sources() if path.suffix == ".c"]
+    with tempfile.TemporaryDirectory(dir=folder) as made_in:
+        interface, library = Path(made_in, INTERFACE), Path(made_in, LIBRARY)
+        named = f'-DGS_SOURCES="{sources.sources_sha256()}"'
         run = subprocess.run(
-            [*command, *FLAGS, *extra_flags, f'-DGS_SOURCES="{sha256}"', "-o", partial, *files, "-lm"],
+            [*command, *FLAGS, *extra_flags, named, "-o", str(library), *files, "-lm"],
+            # zig keeps what it compiled; here it goes with the folder
+            env={"ZIG_LOCAL_CACHE_DIR": made_in, "ZIG_GLOBAL_CACHE_DIR": made_in, **os.environ},
             capture_output=True,
             text=True,
             check=False,
         )
         if run.returncode:
             raise CoreBuildError(f"{command[0]} refused the core:\n{run.stderr.strip()}")
-        os.chmod(partial, 0o755)  # noqa: PTH101 - mkstemp hides its file from other users
-        os.replace(partial, library)  # noqa: PTH105 - atomic, partial is a plain name
-    finally:
-        Path(partial).unlink(missing_ok=True)
-    return library
+        _read_header(interface)
+        for made in (interface, library):
+            made.replace(folder / made.name)
+    return folder
+
+
+def _read_header(interface: Path) -> None:
+    """Write what Python needs to know of ``api.h`` as a module, so that no process has to parse C."""
+    from cffi import FFI  # here: who loads a core needs no parser of C
+
+    lines = (sources.FOLDER / "api.h").read_text().splitlines(keepends=True)
+    declarations = FFI()
+    declarations.set_source(interface.stem, None, compiler_verbose=0)
+    declarations.cdef("".join(line for line in lines if not line.startswith("#")))
+    declarations.emit_python_code(str(interface))

@@ -1,46 +1,12 @@
-/* A stretch of stored packets as a whole: motion, error transition and process noise in one pass each; the twin of
- * groundstation/fusion/flight.py, where the formulas are explained.
+/* A stretch of stored packets as a whole: motion, error transition and process noise in one pass each; the formulas are
+ * explained in tests/oracles/flight.py.
  */
 #include "core.h"
-#include "error_state.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { NEIGHBOURS = 25 };
-
-/* A row of the history; see packet_history.py. */
-typedef struct {
-    double end_s, span_s, omega, ax, ay, warmth, is_hole;
-} Packet;
-
-/* SlopeGrid: the pull of the table on a grid, row by row; laid out in carrier.py. */
-typedef struct {
-    const double *x, *y;
-    int64_t rows, columns;
-    double x0_m, y0_m, step_m, mean_x, mean_y;
-} Grid;
-
-/* A stretch and the state at its start; laid out in carrier.py. */
-typedef struct {
-    const Packet *history;
-    int64_t count;
-    double start_s, stop_s, lag_difference_s, gyro_density, acc_density;
-    double knock_m_s, knock_step_m_s2; /* of a switching valve: its size, the change of force that shows it */
-    int64_t knock_group;               /* packets whose mean force is looked at */
-    const Grid *map;
-    double x[SIZE];
-    /* answered */
-    double moved[MOVING];
-    double duration_s, turned_rad; /* all of it; the middle of the last packet against the start */
-    double F[MOVING * SIZE];
-    double Q[MOVING * MOVING];
-    /* between calls */
-    int64_t first, last;
-} Stretch;
-
-GS_EXPORT size_t gs_stretch_size(void) { return sizeof(Stretch); }
-GS_EXPORT size_t gs_grid_size(void) { return sizeof(Grid); }
 
 /* First row whose end is beyond (or at) a moment. */
 static int64_t row_after(const Packet *p, int64_t count, double t, int or_at) {
@@ -189,11 +155,9 @@ static int64_t fly(Stretch *s, int wants_covariance) {
     return s->last - s->first + 1;
 }
 
-/* Motion alone. */
-GS_EXPORT int64_t gs_stretch_fly(Stretch *s) { return fly(s, 0); }
+int64_t gs_stretch_fly(Stretch *s) { return fly(s, 0); }
 
-/* Motion, and how the covariance goes with it. */
-GS_EXPORT int64_t gs_stretch_carry(Stretch *s) { return fly(s, 1); }
+int64_t gs_stretch_carry(Stretch *s) { return fly(s, 1); }
 
 static void fill_transition(Stretch *s, const Sums *g, double turned_by_scale) {
     const double T = s->duration_s;

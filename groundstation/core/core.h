@@ -6,17 +6,11 @@
 #ifndef GROUNDSTATION_CORE_H
 #define GROUNDSTATION_CORE_H
 
-#include <stddef.h>
-#include <stdint.h>
-
-#if defined(_WIN32)
-#define GS_EXPORT __declspec(dllexport)
-#else
-#define GS_EXPORT __attribute__((visibility("default")))
-#endif
+#include "api.h"
 
 /* Put before loops over integers or independent elements: compiled for AVX2 too and chosen when the library is loaded.
- * Sanitizers cannot run the choosing function that early; GS_NO_CLONES is for the test that both give the same bits. */
+ * Sanitizers cannot run the choosing function that early; clang's clones are no faster and do not give the same bits;
+ * GS_NO_CLONES is for the test that both of a library's do. */
 #if defined(__x86_64__) && defined(__linux__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(GS_NO_CLONES)
 #define GS_CLONES __attribute__((target_clones("avx2", "default")))

@@ -1,26 +1,9 @@
-/* Light spots of a picture, from pixels to sub-pixel centres; in NumPy: star_tracking/detection.py. */
+/* Light spots of a picture, from pixels to sub-pixel centres. */
 #include "levels.h"
 #include "regions.h"
 #include "spot_fit.h"
 
 #include <string.h>
-
-/* What counts as a spot; mirrored by _Settings in star_tracking/detection_core.py. */
-typedef struct {
-    double threshold_sigmas;
-    double hot_pixel_ratio;
-    double gain_dn_per_electron;
-    int32_t saturation_dn;
-    int32_t max_spots;
-    int32_t max_lit; /* pixels */
-} DetectorSettings;
-
-/* What was found besides the spots; mirrored there too. */
-typedef struct {
-    double background_dn, noise_dn;
-    int32_t hot_pixels, cut_by_edge;
-    int32_t is_flooded;
-} DetectionSummary;
 
 typedef struct {
     Levels levels;
@@ -163,18 +146,13 @@ static void gather(const DetectorSettings *settings, Scratch *s)
     }
 }
 
-/* How much scratch memory gs_detect needs for pictures of this size. Only what a picture really needs is touched. */
-GS_EXPORT size_t gs_detect_scratch_bytes(int32_t rows, int32_t columns, const DetectorSettings *settings)
+size_t gs_detect_scratch_bytes(int32_t rows, int32_t columns, const DetectorSettings *settings)
 {
     Scratch s;
     return lay_out(NULL, rows, columns, settings, &s);
 }
 
-/* Find the light spots of a grey picture of at least 32 x 32 pixels, rows `stride` bytes apart.
- *
- * `scratch` holds gs_detect_scratch_bytes and is 64-byte aligned; `fitted` has room for max_spots. Returns how many
- * spots were found, brightest first. */
-GS_EXPORT int32_t gs_detect(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns,
+int32_t gs_detect(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns,
                             const DetectorSettings *settings, uint8_t *scratch, FittedSpot *fitted,
                             DetectionSummary *said)
 {

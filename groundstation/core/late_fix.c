@@ -1,14 +1,11 @@
 /* What a late fix does to state and covariance besides the stretch before it (carry.c): the look at the learned surface,
- * the correction, and the sigmas for the time after it. Twins of look, slope (learned_surface.py), the filter's correction
- * and variance_in_time (measurements.py), where the formulas are explained.
+ * the correction, and the sigmas for the time after it. The formulas are explained in
+ * fusion/learned_surface.py and tests/oracles/late_fix.py.
  */
 #include "core.h"
-#include "error_state.h"
 
 #include <math.h>
 #include <string.h>
-
-enum { MAX_NODES = 64 };
 
 /* Covariance (2, 2m) of the slope at a place with those of the nodes, in units of sigma^2. */
 static void covariance_with_nodes(const double *nodes, int64_t m, double length, double x, double y, double k[2][2 * MAX_NODES]) {
@@ -21,9 +18,7 @@ static void covariance_with_nodes(const double *nodes, int64_t m, double length,
     }
 }
 
-/* Let the local slope be that of a place, in place; 0 if the nodes say too little of it, and nothing was done.
- * w: (2, 2m) regression weights, answered. */
-GS_EXPORT int gs_surface_look(const double *nodes, const double *inverse, int64_t m, double length, double place_x,
+int gs_surface_look(const double *nodes, const double *inverse, int64_t m, double length, double place_x,
                               double place_y, double variance, double unknown_share, double *x, double *P, double *w) {
     double k[2][2 * MAX_NODES], left[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
     const int64_t nodes2 = 2 * m, n = SIZE + nodes2;
@@ -60,8 +55,7 @@ GS_EXPORT int gs_surface_look(const double *nodes, const double *inverse, int64_
     return 1;
 }
 
-/* Expected slope at a place, given the nodes' part of the state. */
-GS_EXPORT void gs_surface_slope(const double *nodes, const double *inverse, int64_t m, double length, double place_x,
+void gs_surface_slope(const double *nodes, const double *inverse, int64_t m, double length, double place_x,
                                 double place_y, const double *at_nodes, double *slope) {
     double k[2][2 * MAX_NODES];
     slope[0] = slope[1] = 0.0;
@@ -88,10 +82,7 @@ static void invert(const double S[3][3], double W[3][3]) {
         for (int j = 0; j < 3; j++) W[i][j] /= determinant;
 }
 
-/* Correct x (n) and P (n, n) in place by three measurements of the first 23 states, unless they lie outside the gate.
- * z: (3) innovation; H: (3, 23); S: (3, 3) the measurements' covariance, answered as the innovation's. Answered: weight
- * (3, 3) its inverse, K (n, 3) gain; the value is z' weight z. */
-GS_EXPORT double gs_correct(double *x, double *P, int64_t n, const double *z, const double *H, double *S, double gate,
+double gs_correct(double *x, double *P, int64_t n, const double *z, const double *H, double *S, double gate,
                             double *weight, double *K) {
     double PH[SIZE + 2 * MAX_NODES][3], SW[3][3], W[3][3];
     for (int64_t i = 0; i < n; i++) {
@@ -135,8 +126,7 @@ GS_EXPORT double gs_correct(double *x, double *P, int64_t n, const double *z, co
     return nis;
 }
 
-/* Coefficients (13) of the variances of x, y and heading in the time after the fix. */
-GS_EXPORT void gs_variance_in_time(const double *x, const double *P, int64_t n, double acc_density, double gyro_density,
+void gs_variance_in_time(const double *x, const double *P, int64_t n, double acc_density, double gyro_density,
                                    double *out) {
     enum { TERMS = 4 };
     const double c = cos(x[THETA]), s = sin(x[THETA]), rx = x[LEVER_X], ry = x[LEVER_Y];

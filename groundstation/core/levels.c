@@ -1,4 +1,4 @@
-/* Background, noise and threshold of a picture; in NumPy: star_tracking/background.py.
+/* Background, noise and threshold of a picture; in NumPy: tests/oracles/background.py.
  *
  * All in whole numbers up to the noise line, so that both give the same ones.
  */

@@ -1,70 +1,9 @@
-/* One IMU packet after another, integrated from the state that the last fix left: the twin of
- * groundstation/fusion/reckoner.py, sum for sum in the same order, so that both give the same bits.
+/* One IMU packet after another, integrated from the state that the last fix left: tests/oracles/reckoner.py
+ * does it sum for sum in the same order, so that both give the same bits.
  */
 #include "core.h"
 
 #include <math.h>
-
-enum {
-    ROW = 7,        /* columns of the history: end, span, omega, ax, ay, warmth, made up */
-    BEHIND = 1,     /* the stamp is not after the last one's: nothing was done */
-    WILD = 2,       /* the readings jumped away: the last good ones were taken */
-    HOLE = 4,       /* packets are missing before this one: there is a row for them too */
-    DISAGREE = 8,   /* the stamp is too far from the tick: it was followed */
-};
-
-typedef struct {
-    double omega, ax, ay;
-} Readings;
-
-/* Laid out field by field in compiled_reckoner.py. All fields are 8 bytes wide. */
-typedef struct {
-    /* asked: one packet */
-    int64_t t_ns;
-    double dt_s;
-    Readings read;
-    double temperature_c;
-    int64_t is_restarted; /* take the packet although its stamp lies behind */
-
-    /* answered: the state of the centre of mass, as PlanarState; then new rows of the history, that of a hole before the packet's */
-    int64_t state_t_ns;
-    double state[12];
-    int64_t is_lost;
-    double row[ROW], hole_row[ROW];
-
-    /* constants */
-    double period_s, max_jitter_s, stamp_gain;
-    double gyro_lag_s, acc_lag_s, lag_difference_s;
-    double max_rate_step, max_force_step, full_rate, full_force;
-
-    /* clock */
-    int64_t origin_ns, newest_ns;
-    double newest_s;
-    int64_t is_begun; /* a packet has come */
-
-    /* screen */
-    int64_t has_last, has_suspect;
-    Readings last, suspect;
-
-    /* what holds since the last fix */
-    int64_t has_pose;
-    double rest_from_s, rest_to_s, checkpoint_s;
-    double variance[13];
-    double gyro_bias, gyro_tempco, gyro_gain;
-    double acc_bias_x, acc_bias_y, acc_tempco_x, acc_tempco_y;
-    double mxx, mxy, myx, myy;
-    double gx, gy; /* slope, wave and what a map says */
-    double lever_x, lever_y;
-
-    /* now */
-    double theta, vx, vy, px, py;
-    double omega, force_x, force_y;
-    double warmth, temperature_c_last, reference_c;
-    double bg, bax, bay; /* at the present temperature */
-    Readings good;       /* the newest that were integrated */
-} Reckoner;
-
-GS_EXPORT size_t gs_reckoner_size(void) { return sizeof(Reckoner); }
 
 static int within(double limit, double value) { return -limit <= value && value <= limit; }
 
@@ -77,7 +16,7 @@ static int is_near(const Reckoner *r, Readings at, Readings other) {
            within(r->max_force_step, at.ay - other.ay);
 }
 
-/* packet_screen.py: one packet that jumps away and back is not motion. */
+/* tests/oracles/packet_screen.py: one packet that jumps away and back is not motion. */
 static int is_wild(Reckoner *r, Readings at) {
     if (!r->has_last) {
         if (is_beyond_scale(r, at)) return 1;
@@ -101,22 +40,15 @@ static int is_wild(Reckoner *r, Readings at) {
     return 1;
 }
 
-/* Biases at the present temperature. */
-GS_EXPORT void gs_reckoner_warm(Reckoner *r) {
+void gs_reckoner_warm(Reckoner *r) {
     r->bg = r->gyro_bias + r->gyro_tempco * r->warmth;
     r->bax = r->acc_bias_x + r->acc_tempco_x * r->warmth;
     r->bay = r->acc_bias_y + r->acc_tempco_y * r->warmth;
 }
 
 /* Write one stretch of constant readings into `row` and integrate it. */
-static void advance(Reckoner *r, double *row, double t, double dt, Readings read, double hole) {
-    row[0] = t;
-    row[1] = dt;
-    row[2] = read.omega;
-    row[3] = read.ax;
-    row[4] = read.ay;
-    row[5] = r->warmth;
-    row[6] = hole;
+static void advance(Reckoner *r, Packet *row, double t, double dt, Readings read, double hole) {
+    *row = (Packet){t, dt, read.omega, read.ax, read.ay, r->warmth, hole};
     if ((r->rest_from_s <= t && t <= r->rest_to_s) || !r->has_pose) return;
     const double w = (read.omega - r->bg) * r->gyro_gain;
     const double ux = read.ax - r->bax, uy = read.ay - r->bay;
@@ -138,8 +70,7 @@ static void advance(Reckoner *r, double *row, double t, double dt, Readings read
     r->omega = w;
 }
 
-/* The state of the centre of mass now: sensor lag undone, lever arm taken off. */
-GS_EXPORT void gs_reckoner_report(Reckoner *r) {
+void gs_reckoner_report(Reckoner *r) {
     const double off = (double)(r->newest_ns - r->origin_ns) * 1e-9 - r->newest_s;
     const double w = r->omega, lag = r->acc_lag_s + off, vx = r->vx, vy = r->vy, gx = r->gx, gy = r->gy;
     const double theta = r->theta + (r->gyro_lag_s + off) * w;
@@ -148,27 +79,27 @@ GS_EXPORT void gs_reckoner_report(Reckoner *r) {
     const double lever_y = s * r->lever_x + c * r->lever_y;
     const double tau = r->newest_s - r->checkpoint_s;
     const double *x = r->variance, *y = x + 5, *h = x + 10;
-    double *state = r->state;
-    r->state_t_ns = r->newest_ns;
-    state[0] = r->px + lag * vx - lever_x;
-    state[1] = r->py + lag * vy - lever_y;
-    state[2] = theta;
-    state[3] = vx + lag * r->force_x + w * lever_y;
-    state[4] = vy + lag * r->force_y - w * lever_x;
-    state[5] = w;
-    state[6] = r->bg;
-    state[7] = r->bax - c * gx - s * gy;
-    state[8] = r->bay + s * gx - c * gy;
-    state[9] = sqrt(x[0] + tau * (x[1] + tau * (x[2] + tau * (x[3] + tau * x[4]))));
-    state[10] = sqrt(y[0] + tau * (y[1] + tau * (y[2] + tau * (y[3] + tau * y[4]))));
-    state[11] = sqrt(h[0] + tau * (h[1] + tau * h[2]));
+    PlanarState *state = &r->state;
+    state->t_ns = r->newest_ns;
+    state->x_m = r->px + lag * vx - lever_x;
+    state->y_m = r->py + lag * vy - lever_y;
+    state->heading_rad = theta;
+    state->vx_m_s = vx + lag * r->force_x + w * lever_y;
+    state->vy_m_s = vy + lag * r->force_y - w * lever_x;
+    state->omega_rad_s = w;
+    state->bias_omega_rad_s = r->bg;
+    state->bias_ax_m_s2 = r->bax - c * gx - s * gy;
+    state->bias_ay_m_s2 = r->bay + s * gx - c * gy;
+    state->std_x_m = sqrt(x[0] + tau * (x[1] + tau * (x[2] + tau * (x[3] + tau * x[4]))));
+    state->std_y_m = sqrt(y[0] + tau * (y[1] + tau * (y[2] + tau * (y[3] + tau * y[4]))));
+    state->std_heading_rad = sqrt(h[0] + tau * (h[1] + tau * h[2]));
 }
 
-/* Take one packet and report; return what happened, see the flags above. */
-GS_EXPORT int gs_reckoner_add(Reckoner *r) {
-    const int64_t t_ns = r->t_ns;
+int gs_reckoner_add(Reckoner *r) {
+    const ImuPacket asked = r->asked;
+    const int64_t t_ns = asked.t_ns;
     const double period = r->period_s;
-    double dt = r->dt_s;
+    double dt = asked.dt_s;
     int flags = 0;
     if (t_ns <= r->newest_ns && !r->is_restarted) return BEHIND;
     r->is_restarted = 0;
@@ -188,14 +119,14 @@ GS_EXPORT int gs_reckoner_add(Reckoner *r) {
     }
     r->newest_ns = t_ns;
     r->newest_s = t;
-    const double temperature_c = r->temperature_c;
-    if (temperature_c != r->temperature_c_last && temperature_c - temperature_c == 0.0) {
-        r->temperature_c_last = temperature_c;
+    const double temperature_c = asked.temperature_c;
+    if (temperature_c != r->temperature_c && temperature_c - temperature_c == 0.0) {
+        r->temperature_c = temperature_c;
         if (isnan(r->reference_c)) r->reference_c = temperature_c;
         r->warmth = temperature_c - r->reference_c;
         gs_reckoner_warm(r);
     }
-    Readings read = r->read;
+    Readings read = {asked.omega_rad_s, asked.ax_m_s2, asked.ay_m_s2};
     double hole = 0.0;
     if (is_wild(r, read)) {
         flags |= WILD;
@@ -208,10 +139,10 @@ GS_EXPORT int gs_reckoner_add(Reckoner *r) {
         dt = period;
         const Readings between = {0.5 * (read.omega + r->good.omega), 0.5 * (read.ax + r->good.ax),
                                   0.5 * (read.ay + r->good.ay)};
-        advance(r, r->hole_row, t - dt, gap, between, 1.0);
+        advance(r, &r->hole_row, t - dt, gap, between, 1.0);
     }
     r->good = read;
-    advance(r, r->row, t, dt, read, hole);
+    advance(r, &r->row, t, dt, read, hole);
     if (r->has_pose) gs_reckoner_report(r);
     return flags;
 }

@@ -5,4 +5,4 @@
 #error "GS_SOURCES is set by the build: the hash of all sources and flags"
 #endif
 
-GS_EXPORT const char *gs_sources(void) { return "groundstation core of " GS_SOURCES; }
+const char *gs_sources(void) { return GS_SOURCES; }

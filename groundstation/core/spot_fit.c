@@ -1,4 +1,4 @@
-/* Sub-pixel centres of light spots; in NumPy, with the same formulas: star_tracking/spot_fit.py.
+/* Sub-pixel centres of light spots; in NumPy, with the same formulas: tests/oracles/spot_fit.py.
  *
  * Moments give the first guess and the shape: one width for the picture, and a streak for every spot whose second
  * moments say so. Then Gauss-Newton steps fit a Gaussian of that shape (a blurred line for long streaks) to the pixels,

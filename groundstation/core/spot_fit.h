@@ -12,19 +12,6 @@ typedef struct {
     double *usable;       /* 0 where saturated, else 1 */
 } SpotPixels;
 
-/* A symmetric 2x2 matrix. */
-typedef struct {
-    double uu, uv, vv;
-} Symmetric;
-
-/* What is handed out: 9 doubles a spot. */
-typedef struct {
-    double u_px, v_px, flux_dn;
-    Symmetric cov_px2;
-    double elongation;
-    double streak_u_px, streak_v_px;
-} FittedSpot;
-
 typedef struct {
     int32_t first, size; /* its pixels */
     double u_px, v_px, flux_dn;

@@ -1,4 +1,4 @@
-/* The log Bayes factor of a match over chance (evidence.py, where it is derived). */
+/* The log Bayes factor of a match over chance (derived in tests/oracles/evidence.py). */
 #include "star_tracker.h"
 
 static const double two_pi = 6.283185307179586;

@@ -1,4 +1,4 @@
-/* Poses that triangles and pairs of spots imply, and the vote on each (hypotheses.py, sky_index.py). */
+/* Poses that triangles and pairs of spots imply, and the vote on each (sky_index.py; tests/oracles/hypotheses.py). */
 #include "star_tracker.h"
 
 /* Count the spots that a pose puts near stars, and keep it if it is among the best. */

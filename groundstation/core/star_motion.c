@@ -1,4 +1,4 @@
-/* What motion does to a picture (motion.py, where the formulas stand). */
+/* What motion does to a picture (tests/oracles/motion.py, where the formulas stand). */
 #include <string.h>
 
 #include "star_tracker.h"

@@ -1,12 +1,10 @@
-/* Points and turns of the ceiling plane: what NumPy holds as one complex128. */
+/* Arithmetic of points and turns of the ceiling plane. */
 #ifndef GROUNDSTATION_STAR_PLANE_H
 #define GROUNDSTATION_STAR_PLANE_H
 
-#include <math.h>
+#include "api.h"
 
-typedef struct {
-    double x, y;
-} Point;
+#include <math.h>
 
 static inline Point add(Point a, Point b) { return (Point){a.x + b.x, a.y + b.y}; }
 

@@ -1,4 +1,4 @@
-/* The pose from matched stars (refinement.py, where the model stands). */
+/* The pose from matched stars (tests/oracles/refinement.py, where the model stands). */
 #include <string.h>
 
 #include "star_tracker.h"

@@ -1,24 +1,15 @@
-/* From spots to a pose: tracking from a prior, or lost in space (search.py, where every step is told). */
+/* From spots to a pose: tracking from a prior, or lost in space (tests/oracles/search.py, step by step). */
 #include <string.h>
 
 #include "star_tracker.h"
 
 enum { DOUBLES_PER_SPOT = 32 }; /* carved by begin() */
 
-GS_EXPORT int64_t gs_star_doubles(int64_t spots) { return DOUBLES_PER_SPOT * spots; }
+int64_t gs_star_doubles(int64_t spots) { return DOUBLES_PER_SPOT * spots; }
 
-GS_EXPORT int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *settings)
+int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *settings)
 {
     return (2 + settings->neighbours) * spots + CELL * settings->candidates + stars;
-}
-
-/* Sizes of the structures, which the caller mirrors. */
-GS_EXPORT void gs_star_sizes(int64_t sizes[4])
-{
-    sizes[0] = sizeof(Rays);
-    sizes[1] = sizeof(Sky);
-    sizes[2] = sizeof(SearchSettings);
-    sizes[3] = sizeof(StarPicture);
 }
 
 static SkySearch begin(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
@@ -83,7 +74,7 @@ static int is_same(const Ballot *ballot, Point middle, const Candidate *a, const
     return length_of(off) < 4.0 * ballot->sky->tolerance_m && length_of(turn) < 0.03;
 }
 
-/* Settle the poses that most spots agree with, and look for rivals of a fix (PureSearch._best); whether to stop. */
+/* Settle the poses that most spots agree with, and look for rivals of a fix (OracleSearch._best); whether to stop. */
 static int close_ballot(SkySearch *s, Ballot *ballot)
 {
     const double gate_m = 2.5 * s->sky->tolerance_m;
@@ -171,7 +162,7 @@ static int lost_in_space(SkySearch *s)
 }
 
 /* Solve one picture with enough spots; the answer is in the picture. */
-GS_EXPORT void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
+void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
 {
     SkySearch s = begin(sky, rays, settings, picture);
     picture->is_fix = picture->is_ambiguous = 0;

@@ -1,4 +1,4 @@
-/* One candidate pose made a fix or refused: matched, refined, put to the test (settling.py). */
+/* One candidate pose made a fix or refused: matched, refined, put to the test (tests/oracles/settling.py). */
 #include <string.h>
 
 #include "star_tracker.h"

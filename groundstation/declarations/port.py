@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drivers.laboratory import CanFrame
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Delivery
@@ -30,7 +29,7 @@ class Edge(ABC):
             DeviceError: The device is gone.
         """
 
-    def write(self, data: bytes | CanFrame) -> None:
+    def write(self, data: object) -> None:
         """Send something out.
 
         Raises:
@@ -57,10 +56,12 @@ class Port(ABC):
         address: Where the rig says it is opened.
         reads: Class of the payloads that come in here.
         delivery: Whether a slow process sees every item or only the newest.
+        is_optional: A laboratory without that channel is no mistake.
     """
 
     reads: ClassVar[type[Message]]
     delivery: ClassVar[Delivery] = Delivery.EVERY
+    is_optional: ClassVar[bool] = False
 
     channel: str
     vehicle: str
@@ -74,7 +75,7 @@ class Port(ABC):
         """Payload classes and vehicles whose messages leave through this edge."""
         return ()
 
-    def to_device(self, payload: Message) -> bytes | CanFrame:
+    def to_device(self, payload: Message) -> object:
         """A message, as it leaves."""
         raise TypeError(f"{self.channel} takes no {type(payload).__name__}")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.declarations.rig_file import RigFile
@@ -78,7 +78,7 @@ class TableSection(Section):
         if self.map is None:
             return None
         try:
-            return slope_grid(self.map.value(TableMap.load))
+            return slope_grid(self.map.value(TableMap.parse))
         except TableMapError as error:
             raise ValueError(f"table.map: {error}") from error
 
@@ -171,6 +171,16 @@ class Rig(Section):
     record: RecordSection = RecordSection()
     nodes: dict[str, NodeSection] = Field(default_factory=dict)
     laboratory: LaboratorySection | None = None
+    _source: object = PrivateAttr(default=None)
+
+    @property
+    def source(self) -> object:
+        """What it was made from, kept by ``groundstation.rig``."""
+        return self._source
+
+    def keep_source(self, source: object) -> None:
+        """Keep what it was made from; for who reads it."""
+        self._source = source
 
     def section(self, kind: type[S]) -> S:
         """The keys that a part has added to the rig itself."""

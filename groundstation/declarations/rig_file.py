@@ -32,11 +32,11 @@ class RigFile:
         self.sha256 = hashlib.sha256(data).hexdigest()
         self._values: dict[object, Any] = {}
 
-    def value(self, load: Callable[[Path], T]) -> T:
-        """What the file says, parsed at the first call."""
-        if load not in self._values:
-            self._values[load] = load(self.path)
-        found: T = self._values[load]
+    def value(self, parse: Callable[[bytes, Path], T]) -> T:
+        """What the file says, parsed at the first call from the bytes that were hashed."""
+        if parse not in self._values:
+            self._values[parse] = parse(self.data, self.path)
+        found: T = self._values[parse]
         return found
 
     def text(self) -> str:

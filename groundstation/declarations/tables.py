@@ -38,20 +38,19 @@ class Tables:
 
     def __init__(self, parts: Iterable[Part], topics: Iterable[type[Message]] = ()) -> None:
         listed = tuple(parts)
-        self.parts: Mapping[str, Part] = _by_name("part", ((part.name, part) for part in listed))
-        kinds = [*topics, *(kind for part in listed for kind in part.topics)]
-        self.payloads: Mapping[str, type[Message]] = _by_name(
-            "topic", ((kind.TOPIC.noun, kind) for kind in kinds)
-        )
+        self.parts: Mapping[str, Part] = _by_name("part", ((part.name, part, part) for part in listed))
+        own = ((kind.TOPIC.noun, kind, None) for kind in topics)
+        declared = ((kind.TOPIC.noun, kind, part) for part in listed for kind in part.topics)
+        self.payloads: Mapping[str, type[Message]] = _by_name("topic", (*own, *declared))
         self.nodes: Mapping[str, NodeRow] = _by_name(
-            "node", ((row.name, row) for part in listed for row in part.nodes)
+            "node", ((row.name, row, part) for part in listed for row in part.nodes)
         )
         self.ports: tuple[PortRow, ...] = tuple(row for part in listed for row in part.ports)
         self.actions: Mapping[str, Action] = _by_name(
-            "action", ((row.name, row) for part in listed for row in part.actions)
+            "action", ((row.name, row, part) for part in listed for row in part.actions)
         )
         self.fix_sources: Mapping[str, FixSource] = _by_name(
-            "fix source", ((row.name, row) for part in listed for row in part.fix_sources)
+            "fix source", ((row.name, row, part) for part in listed for row in part.fix_sources)
         )
         for port in self.ports:
             if port.node not in self.nodes:
@@ -67,10 +66,13 @@ class Tables:
         return next((part.name for part in self.parts.values() if payload in part.topics), "")
 
 
-def _by_name(what: str, rows: Iterable[tuple[str, T]]) -> dict[str, T]:
+def _by_name(what: str, rows: Iterable[tuple[str, T, Part | None]]) -> dict[str, T]:
+    """Rows by name; the part of each, None for the runners, is for the complaint."""
     found: dict[str, T] = {}
-    for name, row in rows:
+    owners: dict[str, Part | None] = {}
+    for name, row, part in rows:
         if name in found:
-            raise PartError(f"two parts declare a {what} named {name!r}")
-        found[name] = row
+            first, second = (owner.name if owner else "of the runners" for owner in (owners[name], part))
+            raise PartError(f"the parts {first!r} and {second!r} both declare a {what} named {name!r}")
+        found[name], owners[name] = row, part
     return found

@@ -1,5 +1,8 @@
-"""What a calibration file that cannot be used raises."""
+"""What a file that cannot be used raises."""
 
 
-class CalibrationFileError(ValueError):
+class FileError(ValueError):
     """A file is missing, torn or says something impossible; the message is one sentence naming it."""
+
+
+CalibrationFileError = FileError

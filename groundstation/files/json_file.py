@@ -1,28 +1,30 @@
-"""A JSON object from a file, refused in one sentence."""
+"""JSON objects."""
 
 import json
 from pathlib import Path
 from typing import Any
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
+from groundstation.files.reading import text_of
 
 
-def read_camera_file(path: Path) -> dict[str, Any]:
-    """Read the JSON object of a camera.
+def parse_json(data: bytes, path: Path) -> dict[str, Any]:
+    """Read a file that holds one JSON object.
 
     Raises:
-        CalibrationFileError: The file is missing, no text, no JSON or no object.
+        FileError: It is no text, no JSON or no object.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-    except UnicodeDecodeError as error:
-        raise CalibrationFileError(f"{path}: is not a text file.") from error
-    try:
-        data = json.loads(text)
+        found = json.loads(text_of(data, path))
     except json.JSONDecodeError as error:
-        raise CalibrationFileError(f"{path}: line {error.lineno} is no JSON ({error.msg}).") from error
-    if not isinstance(data, dict):
-        raise CalibrationFileError(f"{path}: expected a JSON object with the camera's keys.")
-    return data
+        raise FileError(
+            f"{path}: line {error.lineno}, column {error.colno} is no JSON ({error.msg})."
+        ) from error
+    if not isinstance(found, dict):
+        raise FileError(f"{path}: expected a JSON object, found {type(found).__name__}.")
+    return found
+
+
+def json_text(values: dict[str, Any]) -> str:
+    """Return an object as it is written to files for people."""
+    return json.dumps(values, indent=1) + "\n"

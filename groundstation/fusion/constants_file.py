@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.toml_file import parse_toml
 
 ALIASES: Mapping[str, str] = {
     "scale": "gyro_scale",
@@ -32,31 +33,38 @@ UNITS: Mapping[str, str] = {
 """What lasts from one run to the next, with the unit that a file must give it in."""
 
 
-class ConstantsError(CalibrationFileError):
-    """A calibration file cannot be used; the message is one sentence that names file and key."""
+ConstantsError = FileError
+
+Constants = dict[str, tuple[float, float]]
+"""Value and sigma by name."""
 
 
-def read_constants(paths: Sequence[Path]) -> dict[str, tuple[float, float]]:
+def read_constants(paths: Sequence[Path]) -> Constants:
     """Read value and sigma of every constant that lasts; of one that several files hold, the surest counts.
 
     Raises:
-        ConstantsError: a file is missing, no TOML or without such a constant; or one of them is wrong.
+        FileError: A file is missing, no TOML or without such a constant; or one of them is wrong.
     """
-    found: dict[str, tuple[float, float]] = {}
-    for path in paths:
-        for name, (value, std) in _read(path).items():
+    return surest(parse_constants(read_bytes(path), path) for path in paths)
+
+
+def surest(files: Iterable[Constants]) -> Constants:
+    """Return the constants of several files; of one that several hold, the surest counts."""
+    found: Constants = {}
+    for constants in files:
+        for name, (value, std) in constants.items():
             if name not in found or std < found[name][1]:
                 found[name] = (value, std)
     return found
 
 
-def _read(path: Path) -> dict[str, tuple[float, float]]:
-    try:
-        text = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConstantsError(f"{path} cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConstantsError(f"{path} is not valid TOML: {error}") from error
+def parse_constants(data: bytes, path: Path) -> Constants:
+    """Read the content of one file.
+
+    Raises:
+        FileError: It is no TOML or without a constant that lasts; or one of them is wrong.
+    """
+    text = parse_toml(data, path)
     found = {}
     for key, table in text.items():
         name = ALIASES.get(key, key)
@@ -64,18 +72,18 @@ def _read(path: Path) -> dict[str, tuple[float, float]]:
             continue
         value, std = _number(path, key, table, "value"), _number(path, key, table, "std")
         if math.isnan(value) or math.isnan(std):
-            continue  # the calibration itself said that it could not tell
+            continue  # the calibration could not determine it
         if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
-            raise ConstantsError(f"{path}: {key} must be finite with a std above zero")
+            raise FileError(f"{path}: {key} must be finite with a std above zero.")
         if table.get("unit") != UNITS[name]:
-            raise ConstantsError(
-                f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r}"
+            raise FileError(
+                f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r}."
             )
         found[name] = (value, std)
     if not found:
-        raise ConstantsError(
+        raise FileError(
             f"{path} holds no constant that lasts: give it the result of `calibrate joint`, `imu`, `tilt`, "
-            "`gyro-scale` or `temperature`"
+            "`gyro-scale` or `temperature`."
         )
     return found
 
@@ -83,5 +91,5 @@ def _read(path: Path) -> dict[str, tuple[float, float]]:
 def _number(path: Path, key: str, table: dict[str, object], part: str) -> float:
     value = table.get(part)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConstantsError(f"{path}: {key}.{part} must be a number, found {value!r}")
+        raise FileError(f"{path}: {key}.{part} must be a number, found {value!r}.")
     return float(value)

@@ -17,6 +17,9 @@ from groundstation.fusion.noise import NoiseModel
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
+WAITS = "waits for packets"
+"""Reason of an account that is not the last word: another one follows by `Estimator.settled`."""
+
 
 class ImuPacket(NamedTuple):
     """Mean of the polls of one averaging window, body frame."""

@@ -1,4 +1,4 @@
-"""What a late fix does to state and covariance: in the compiled core, or by NumPy.
+"""What a late fix does to state and covariance, in the core (``late_fix.c``).
 
 The stretch of packets before it is `carrier`'s. States x are (23 + 2m,), covariances P (23 + 2m, 23 + 2m) and
 contiguous, with m nodes of the learned surface.
@@ -6,24 +6,18 @@ contiguous, with m nodes of the learned surface.
 
 from __future__ import annotations
 
-from ctypes import c_double, c_int, c_int64, c_void_p
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.core.library import Core, CoreError
+from groundstation.core.library import default_core
 from groundstation.fusion.error_state import SIZE
-from groundstation.fusion.learned_surface import MAX_NODES, UNKNOWN_SHARE, LearnedSurface, look
-from groundstation.fusion.measurements import variance_in_time
+from groundstation.fusion.learned_surface import UNKNOWN_SHARE, LearnedSurface, look
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.trace import Looked
 
 Array = NDArray[np.float64]
-
-
-CORE_NODES = 64
-"""``MAX_NODES`` of late_fix.c."""
 
 
 class Correction(NamedTuple):
@@ -44,57 +38,36 @@ class LateFix:
 
     Args:
         noise: of sensors and table.
-        core: a compiled one, or ``PURE``; both give the same to rounding, which inversions enlarge:
-            1e-7 relative, or 1e-10 of the largest element.
 
     Raises:
-        CoreError: the core does not fit.
+        CoreError: there is no core.
     """
 
-    def __init__(self, noise: NoiseModel, core: Core) -> None:
+    def __init__(self, noise: NoiseModel) -> None:
+        core = default_core()
+        self._lib, self._view = core.lib, core.ffi.from_buffer
         self._noise = noise
         self._wave_variance = noise.waviness_sigma_m_s2**2
-        self._is_compiled = core.is_compiled
         self._surface: LearnedSurface | None = None
-        if not core.is_compiled:
-            return
-        if MAX_NODES > CORE_NODES:
-            raise CoreError(
-                f"the compiled core has room for {CORE_NODES} nodes of a surface, not {MAX_NODES}"
-            )
-        address, place = c_void_p, (c_double, c_double)
-        nodes = (address, address, c_int64, c_double)
-        self._look = core.function(
-            "gs_surface_look", c_int, *nodes, *place, c_double, c_double, address, address, address
-        )
-        self._slope = core.function("gs_surface_slope", None, *nodes, *place, address, address)
-        self._correct = core.function(
-            "gs_correct", c_double, address, address, c_int64, *[address] * 3, c_double, address, address
-        )
-        self._variance = core.function(
-            "gs_variance_in_time", None, address, address, c_int64, c_double, c_double, address
-        )
-        self._pair, self._coefficients = np.empty(2), np.empty(13)
-        self._pair_at, self._coefficients_at = self._pair.ctypes.data, self._coefficients.ctypes.data
+        self._pair = np.empty(2)
+        self._pair_at, self._coefficients = self._at(self._pair), core.ffi.new("double[13]")
 
     def look(
         self, surface: LearnedSurface, x: Array, P: Array, place_m: Array
     ) -> tuple[LearnedSurface, Array, Array, Looked]:
         """Let the local slope be that of a place; see `learned_surface.look`."""
-        if self._is_compiled and len(surface.nodes_m):
+        if len(surface.nodes_m):
             w = np.empty((2, len(x) - SIZE))
             share = (self._wave_variance, UNKNOWN_SHARE)
-            at = place_m.tolist()
-            if self._look(*self._nodes(surface), *at, *share, x.ctypes.data, P.ctypes.data, w.ctypes.data):
+            arrays = (self._at(x), self._at(P), self._at(w))
+            if self._lib.gs_surface_look(*self._nodes(surface), *place_m.tolist(), *share, *arrays):
                 return surface, x, P, Looked(w, None, None)
         return look(surface, x, P, place_m, self._noise)
 
     def slope(self, surface: LearnedSurface, x: Array, place_m: Array) -> Array:
         """Return the expected slope (2,) at a place."""
-        if not self._is_compiled:
-            return surface.slope(x, place_m)
-        at_nodes = x.ctypes.data + SIZE * x.itemsize
-        self._slope(*self._nodes(surface), *place_m.tolist(), at_nodes, self._pair_at)
+        at_nodes = self._at(x) + SIZE
+        self._lib.gs_surface_slope(*self._nodes(surface), *place_m.tolist(), at_nodes, self._pair_at)
         return self._pair
 
     def correct(self, x: Array, P: Array, z: Array, H: Array, R: Array, gate: float) -> Correction:
@@ -108,37 +81,30 @@ class LateFix:
             R: (3, 3) covariance of the fix.
             gate: largest normalised innovation squared.
         """
-        if self._is_compiled:
-            S, weight, K = np.array(R), np.empty((3, 3)), np.empty((len(x), 3))
-            nis = self._correct(
-                x.ctypes.data, P.ctypes.data, len(x), z.ctypes.data, H.ctypes.data, S.ctypes.data, gate,
-                weight.ctypes.data, K.ctypes.data,
-            )  # fmt: skip
-            return Correction(nis, S, weight, K)
-        PH = P[:, :SIZE] @ H.T
-        S = H @ PH[:SIZE] + R
-        weight = np.asarray(np.linalg.inv(S), dtype=np.float64)
-        K = PH @ weight
-        nis = float(z @ weight @ z)
-        if nis <= gate:
-            x += K @ z
-            P -= K @ S @ K.T
-            P[:] = 0.5 * (P + P.T)
+        S, weight, K = np.array(R), np.empty((3, 3)), np.empty((len(x), 3))
+        at = self._at
+        nis = self._lib.gs_correct(at(x), at(P), len(x), at(z), at(H), at(S), gate, at(weight), at(K))
         return Correction(nis, S, weight, K)
 
     def variance_in_time(self, x: Array, P: Array, noise: NoiseModel) -> list[float]:
-        """Return polynomial coefficients; see `measurements.variance_in_time`."""
-        if not self._is_compiled:
-            return variance_in_time(x, P, noise)
-        densities = (noise.acc_density_m_s2_rthz, noise.gyro_density_rad_s_rthz)
-        self._variance(x.ctypes.data, P.ctypes.data, len(x), *densities, self._coefficients_at)
-        return self._coefficients.tolist()
+        """Return polynomial coefficients of the variances of x, y (five each) and heading (three).
 
-    def _nodes(self, surface: LearnedSurface) -> tuple[int, int, int, float]:
-        """Addresses of a surface's nodes and inverse, their number, the length; the surface is kept alive."""
+        The argument is the time in s since P held. The error of a position grows as p + v t + a t^2 / 2 with
+        the constant error a of biases and slope, plus white noise; evaluating that costs a microsecond where
+        carrying a covariance would cost a hundred.
+        """
+        densities = (noise.acc_density_m_s2_rthz, noise.gyro_density_rad_s_rthz)
+        self._lib.gs_variance_in_time(self._at(x), self._at(P), len(x), *densities, self._coefficients)
+        return list(self._coefficients)
+
+    def _at(self, array: Array) -> Any:  # noqa: ANN401 - a pointer of cffi
+        """Where a contiguous array's numbers are; the pointer keeps the array alive."""
+        return self._view("double[]", array)
+
+    def _nodes(self, surface: LearnedSurface) -> tuple[Any, Any, int, float]:
+        """A surface's nodes and inverse, their number, the length; the surface is kept alive."""
         if surface is not self._surface:
             self._surface = surface
-            self._kept = np.ascontiguousarray(surface.nodes_m), np.ascontiguousarray(surface.inverse)
-            nodes, inverse = self._kept
-            self._found = nodes.ctypes.data, inverse.ctypes.data, len(nodes), surface.length_m
+            nodes, inverse = (np.ascontiguousarray(part) for part in (surface.nodes_m, surface.inverse))
+            self._found = self._at(nodes), self._at(inverse), len(nodes), surface.length_m
         return self._found

@@ -70,13 +70,6 @@ class LearnedSurface:
         w = k @ self.inverse
         return w, UNIT - w @ k.T
 
-    def slope(self, x: Array, place_m: Array) -> Array:
-        """Return the expected slope (2,) at a place, given the filter's state (23 + 2m,)."""
-        d = (place_m - self.nodes_m) / self.length_m
-        near = np.exp(-0.5 * np.einsum("ij,ij->i", d, d))
-        pull = (self.inverse @ x[es.SIZE :]).reshape(-1, 2)
-        return np.asarray(near @ pull - (near * np.einsum("ij,ij->i", d, pull)) @ d)
-
 
 def covariance(p_m: Array, q_m: Array, length_m: float) -> Array:
     """Return (2a, 2b) of the slopes at places (a, 2) and (b, 2), in units of sigma^2; x, y alternate."""

@@ -183,36 +183,10 @@ def reported(x: Array, omega_rad_s: float) -> Array:
     return H
 
 
-def variance_in_time(x: Array, P: Array, noise: NoiseModel) -> list[float]:
-    """Return polynomial coefficients of the variances of x, y (five each) and heading (three).
-
-    The argument is the time in s since P held. The error of a position grows as p + v t + a t^2 / 2 with the
-    constant error a of biases and slope, plus white noise; evaluating that costs a microsecond where carrying
-    a covariance would cost a hundred.
-    """
-    c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
-    rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
-    L = np.zeros((6, es.SIZE))  # x and y: position of the centre of mass, velocity, constant acceleration
-    L[0, es.PX] = L[1, es.PY] = L[2, es.VX] = L[3, es.VY] = 1.0
-    L[0, es.THETA], L[1, es.THETA] = s * rx + c * ry, s * ry - c * rx
-    L[0, es.LEVER_X] = L[1, es.LEVER_Y] = L[4, es.ACC_BIAS_X] = L[5, es.ACC_BIAS_Y] = -c
-    L[0, es.LEVER_Y] = L[4, es.ACC_BIAS_Y] = s
-    L[1, es.LEVER_X] = L[5, es.ACC_BIAS_X] = -s
-    L[4, es.SLOPE_X] = L[4, es.WAVE_X] = L[5, es.SLOPE_Y] = L[5, es.WAVE_Y] = 1.0
-    C = L @ P[: es.SIZE, : es.SIZE] @ L.T
-    white = noise.acc_density_m_s2_rthz**2 / 3.0
-    out: list[float] = []
-    for p, v, a in ((0, 2, 4), (1, 3, 5)):
-        out += [C[p, p], 2.0 * C[p, v], C[v, v] + C[p, a], C[v, a] + white, C[a, a] / 4.0]
-    g = es.GYRO_BIAS
-    out += [P[0, 0], noise.gyro_density_rad_s_rthz**2 - 2.0 * P[0, g], P[g, g]]
-    return [float(value) for value in out]
-
-
 def add_scale_in_time(variance: list[float], P: Array, omega_rad_s: float) -> None:
     """Add to the heading's coefficients, in place, what the gyro's scale adds while turning at a rate.
 
-    The rate's error is -(b_g + w s_g); `variance_in_time` has the first part.
+    The rate's error is -(b_g + w s_g); `LateFix.variance_in_time` has the first part.
     """
     g, k, w = es.GYRO_BIAS, es.GYRO_SCALE, omega_rad_s
     variance[11] -= 2.0 * w * float(P[es.THETA, k])

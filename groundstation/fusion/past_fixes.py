@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from groundstation.fusion.checkpoint import Checkpoint
 from groundstation.fusion.creep_watch import CreepWatch
-from groundstation.fusion.estimator import Array, Fix
-from groundstation.fusion.learned_surface import LearnedSurface
+from groundstation.fusion.estimator import Fix
 
 MEMORY_S = 2.0
 """A fix that comes later than this after one that was used is too old to matter."""
@@ -21,12 +21,14 @@ MEMORY_S = 2.0
 class Past:
     """A used fix and the filter after it."""
 
-    t_s: float
     fix: Fix
-    x: Array
-    P: Array
-    surface: LearnedSurface
+    checkpoint: Checkpoint
     creep: CreepWatch
+
+    @property
+    def t_s(self) -> float:
+        """The fix's exposure."""
+        return self.checkpoint.t_s
 
 
 class PastFixes:

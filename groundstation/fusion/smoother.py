@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
-from groundstation.fusion.flight import fly
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory, Segment
 from groundstation.fusion.slope_grid import SlopeGrid
@@ -84,12 +83,11 @@ def _between(
         v, p, a = np.zeros((2, n)), np.repeat(after.x[es.PX : es.PY + 1, None], n, axis=1), np.zeros((2, n))
         share = np.ones(n)
     else:
-        flight = fly(x, segment, noise.gyro_lag_s - noise.acc_lag_s)
         warm = segment.warmth_k
         omega = (segment.omega_rad_s - x[es.GYRO_BIAS] - x[es.GYRO_TEMPCO] * warm) * (1.0 - x[es.GYRO_SCALE])
         theta = x[es.THETA] + np.cumsum(omega * dt)
         pull = x[es.SLOPE_X : es.SLOPE_Y + 1] + x[es.WAVE_X : es.WAVE_Y + 1]
-        a = flight.force_table + pull[:, None]
+        a = _forces(x, segment, omega, noise) + pull[:, None]
         if table_map is not None:
             began = np.cumsum(dt) - 0.5 * dt
             a = a + table_map.along(x[es.PX] + x[es.VX] * began, x[es.PY] + x[es.VY] * began)
@@ -124,3 +122,19 @@ def _between(
             for node in (before, after)]  # fmt: skip
     variance = np.outer(1.0 - share, ends[0][:3]) + np.outer(share, ends[1][:3])
     return state, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _forces(x: Array, segment: Segment, omega_rad_s: Array, noise: NoiseModel) -> Array:
+    """Return the specific force (2, n) of each packet, corrected, table frame.
+
+    Forces are as old as their filter, so they are turned by the heading of that moment.
+    """
+    step = omega_rad_s * segment.span_s
+    middle = np.cumsum(step) - 0.5 * step
+    theta = middle + (x[es.THETA] + (noise.gyro_lag_s - noise.acc_lag_s) * omega_rad_s)
+    ux = segment.ax_m_s2 - x[es.ACC_BIAS_X] - x[es.ACC_TEMPCO_X] * segment.warmth_k
+    uy = segment.ay_m_s2 - x[es.ACC_BIAS_Y] - x[es.ACC_TEMPCO_Y] * segment.warmth_k
+    mxx, mxy, myx, myy = x[es.ACC_MATRIX : es.ACC_MATRIX + 4]
+    fx, fy = (1.0 - mxx) * ux - mxy * uy, (1.0 - myy) * uy - myx * ux
+    c, s = np.cos(theta), np.sin(theta)
+    return np.stack([c * fx - s * fy, s * fx + c * fy])

@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-import os
-import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,8 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import CalibrationFileError
-from groundstation.files.toml_text import toml_lines, toml_table
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.toml_file import parse_toml, toml_lines, toml_table
+from groundstation.files.writing import write_files
 
 Array = NDArray[np.float64]
 
@@ -25,8 +26,7 @@ G_M_S2 = 9.80665
 _ARRAYS = ("ax_m_s2", "ay_m_s2", "std_x_m_s2", "std_y_m_s2", "height_m")
 
 
-class TableMapError(CalibrationFileError):
-    """A map cannot be read, written or made; the message is one sentence that names the file or key."""
+TableMapError = FileError
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +70,15 @@ class TableMap:
     def __post_init__(self) -> None:
         shape = self.ax_m_s2.shape
         if len(shape) != 2 or min(shape) < 2:
-            raise TableMapError(f"a map needs at least 2 x 2 grid points, found {shape}")
+            raise ValueError(f"a map needs at least 2 x 2 grid points, found {shape}")
         for name in _ARRAYS:
             value = getattr(self, name)
             if value.shape != shape:
-                raise TableMapError(f"{name} is {value.shape}, ax_m_s2 is {shape}")
+                raise ValueError(f"{name} is {value.shape}, ax_m_s2 is {shape}")
             if not np.isfinite(value).all():
-                raise TableMapError(f"{name} holds a number that is not finite")
+                raise ValueError(f"{name} holds a number that is not finite")
         if not (math.isfinite(self.step_m) and self.step_m > 0.0):
-            raise TableMapError(f"step_m must be above zero, found {self.step_m}")
+            raise ValueError(f"step_m must be above zero, found {self.step_m}")
 
     @property
     def x_m(self) -> Array:
@@ -132,29 +132,23 @@ class TableMap:
         """Write `path` (TOML) and the grid beside it (`.npz`), both or none.
 
         Raises:
-            TableMapError: the folder does not exist or may not be written.
+            FileError: the folder does not exist or may not be written.
         """
+        write_files(self.files(path))
+
+    def files(self, path: Path) -> dict[Path, bytes | str]:
+        """Return what is written: `path` (TOML) and the grid beside it (`.npz`)."""
         memory = io.BytesIO()
         np.savez_compressed(memory, **{name: getattr(self, name) for name in _ARRAYS}, allow_pickle=False)
         grid, grid_path = memory.getvalue(), path.with_suffix(".npz")
         text = self._text(grid_path.name, hashlib.sha256(grid).hexdigest())
-        parts = [(path.with_name(f".{p.name}.{os.getpid()}.part"), p) for p in (grid_path, path)]
-        try:
-            for (part, _), data in zip(parts, (grid, text.encode()), strict=True):
-                part.write_bytes(data)
-            for part, final in parts:
-                os.replace(part, final)  # noqa: PTH105 - the call that promises atomicity
-        except OSError as error:
-            raise TableMapError(f"{path} cannot be written: {error.strerror}") from error
-        finally:
-            for part, _ in parts:
-                part.unlink(missing_ok=True)
+        return {grid_path: grid, path: text}
 
     def _text(self, grid_name: str, grid_sha256: str) -> str:
-        said = self.provenance
+        origin = self.provenance
         std = np.sqrt(self.mean_cov_m2_s4.diagonal())
         lines = ["# Table map: what pulls an unpushed vehicle along the table, by place", ""]
-        lines += toml_lines({"made_utc": said.made_utc})
+        lines += toml_lines({"made_utc": origin.made_utc})
         lines += toml_table(
             "grid",
             {
@@ -173,33 +167,44 @@ class TableMap:
         lines += toml_table("mean.covariance", {"value": self.mean_cov_m2_s4.tolist(), "unit": "m^2/s^4"})
         lines += toml_table("mean.uphill_gradient", {"value": tilt[0], "std": tilt[1], "unit": "rad"})
         lines += toml_table("unvisited_std", {"value": self.far_std_m_s2, "unit": "m/s^2"})
-        lines += toml_table("residual.chi_square_ratio", {"value": said.residual_ratio, "unit": "1"})
-        lines += toml_table("flown", {"value": said.flown_s, "unit": "s"})
-        if said.notes:
-            lines += toml_table("notes", said.notes)
-        for name, sha256 in said.recordings.items():
+        lines += toml_table("residual.chi_square_ratio", {"value": origin.residual_ratio, "unit": "1"})
+        lines += toml_table("flown", {"value": origin.flown_s, "unit": "s"})
+        if origin.notes:
+            lines += toml_table("notes", origin.notes)
+        for name, sha256 in origin.recordings.items():
             lines += toml_table("recordings", {"name": name, "sha256": sha256}, is_row=True)
         return "\n".join(lines) + "\n"
 
     @classmethod
     def load(cls, path: Path) -> TableMap:
-        """Read a map.
+        """Read a map and its grid.
 
         Raises:
-            TableMapError: one sentence with file and key.
+            FileError: One sentence with file and key.
         """
+        return cls.parse(read_bytes(path), path)
+
+    @classmethod
+    def parse(cls, data: bytes, path: Path, read: Callable[[Path], bytes] = read_bytes) -> TableMap:
+        """Read the content of a map.
+
+        Args:
+            data: Of the TOML.
+            path: Its name; the grid lies beside it.
+            read: Gives the content of the grid's file.
+
+        Raises:
+            FileError: One sentence with file and key.
+        """
+        text = parse_toml(data, path)
         try:
-            text = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise TableMapError(f"{path} cannot be read: {error.strerror}") from error
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise TableMapError(f"{path} is not valid TOML: {error}") from error
-        try:
-            return cls._from(text, _read_grid(path, text))
+            return cls._from(text, _parse_grid(path, text, read))
+        except FileError:
+            raise
         except KeyError as error:
-            raise TableMapError(f"{path}: key {error.args[0]} is missing") from error
+            raise FileError(f"{path}: key {error.args[0]} is missing.") from error
         except (TypeError, ValueError) as error:
-            raise TableMapError(f"{path}: {error}") from error
+            raise FileError(f"{path}: {error}.") from error
 
     @classmethod
     def _from(cls, text: dict[str, Any], grids: dict[str, Array]) -> TableMap:
@@ -222,14 +227,14 @@ class TableMap:
         )
 
 
-def _read_grid(path: Path, text: dict[str, Any]) -> dict[str, Array]:
+def _parse_grid(path: Path, text: dict[str, Any], read: Callable[[Path], bytes]) -> dict[str, Array]:
     """Read the arrays that a map's TOML names, and check that they are the ones it was written with."""
     grid_path = path.with_name(str(text["grid"]["file"]))
     try:
-        data = grid_path.read_bytes()
-    except OSError as error:
-        raise TableMapError(f"{grid_path}, named by {path}, cannot be read: {error.strerror}") from error
+        data = read(grid_path)
+    except FileError as error:
+        raise FileError(f"{path}: its grid {error}") from error
     if hashlib.sha256(data).hexdigest() != text["grid"]["sha256"]:
-        raise TableMapError(f"{grid_path} is not the grid that {path} was written with (SHA-256 differs)")
+        raise FileError(f"{grid_path} is not the grid that {path} was written with (SHA-256 differs).")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         return {name: np.asarray(arrays[name], dtype=np.float64) for name in _ARRAYS}

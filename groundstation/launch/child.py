@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from typing import BinaryIO, Protocol
+from typing import IO, Protocol
 
 FIRST_BACK_OFF_S, LAST_BACK_OFF_S, PROVEN_S = 0.25, 8.0, 20.0
 REFUSAL = 2
@@ -22,13 +22,13 @@ class Process(Protocol):
     pid: int
 
     @property
-    def stdin(self) -> BinaryIO | None: ...
+    def stdin(self) -> IO[bytes] | None: ...
 
     @property
-    def stdout(self) -> BinaryIO | None: ...
+    def stdout(self) -> IO[bytes] | None: ...
 
     @property
-    def stderr(self) -> BinaryIO | None: ...
+    def stderr(self) -> IO[bytes] | None: ...
 
     def poll(self) -> int | None: ...
 
@@ -202,7 +202,7 @@ class Lines:
         pipe: Its reading end; None for no lines.
     """
 
-    def __init__(self, pipe: BinaryIO | None) -> None:
+    def __init__(self, pipe: IO[bytes] | None) -> None:
         self._descriptor = None if pipe is None else pipe.fileno()
         self._begun = b""
         if self._descriptor is not None:
@@ -220,7 +220,8 @@ class Lines:
                 break
             if not read:
                 self._descriptor = None
-                data += b"\n" if data else b""
+                if data and not data.endswith(b"\n"):
+                    data += b"\n"
                 break
             data += read
         *lines, self._begun = data.split(b"\n")

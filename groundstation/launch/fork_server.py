@@ -22,7 +22,7 @@ import struct
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
@@ -32,6 +32,8 @@ ANSWER_WITHIN_S = 10.0
 """A server that still loads what it needs answers late; one that takes longer is given up."""
 
 _SET_CHILD_SUBREAPER = 36  # <sys/prctl.h>
+_ARENA_MAX = -8  # <malloc.h>
+_LOADED = b"loaded"
 _PID = struct.Struct("<i")
 _ARGUMENTS = 45  # field of /proc/self/stat behind the name: where the command line begins in memory
 _KEPT_OPEN = 3  # stdin, stdout, stderr
@@ -98,7 +100,7 @@ class ForkServer:
     """The launcher's side of the server.
 
     Args:
-        modules: What a server of its own interpreter loads before it forks.
+        modules: What the server loads before it forks.
 
     Attributes:
         pid: Of the server; None before ``start``.
@@ -108,7 +110,17 @@ class ForkServer:
         self._modules = modules
         self._socket: socket.socket | None = None
         self._popen: subprocess.Popen[bytes] | None = None
+        self._is_loaded = False
         self.pid: int | None = None
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether it has loaded its modules, and forks at once."""
+        if not self._is_loaded and self._socket is not None:
+            self._is_loaded = bool(select.select([self._socket], [], [], 0.0)[0])
+            if self._is_loaded:
+                self._socket.recv(len(_LOADED))
+        return self._is_loaded
 
     def start(self) -> None:
         """Start the server, or another one for a server that has ended.
@@ -119,7 +131,7 @@ class ForkServer:
         _adopt_orphans()
         self.close()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket = ours
+        self._socket, self._is_loaded = ours, False
         with theirs:
             if _has_threads():  # they would be missing in the copy, their locks perhaps held
                 self._start_interpreter(theirs.fileno())
@@ -191,6 +203,8 @@ class ForkServer:
     def _ask_once(self, descriptors: list[int]) -> int:
         if self._socket is None:
             raise ConnectionError("it was not started")
+        if not self._is_loaded:
+            self._is_loaded = self._socket.recv(len(_LOADED)) == _LOADED
         socket.send_fds(self._socket, [b"f"], descriptors)
         answer = self._socket.recv(_PID.size)
         if len(answer) != _PID.size:
@@ -221,8 +235,6 @@ class ForkServer:
         self.pid = self._popen.pid
 
     def _fork_ourselves(self, theirs: socket.socket) -> None:
-        for module in self._modules:
-            importlib.import_module(module)
         sys.stdout.flush()
         sys.stderr.flush()
         gc.collect()
@@ -232,7 +244,7 @@ class ForkServer:
             code = 1
             try:
                 os.setsid()
-                _serve(theirs)
+                _serve(theirs, self._modules)
                 code = 0
             except BaseException:  # whatever it is, it must not return into the launcher's code
                 traceback.print_exc()
@@ -247,13 +259,20 @@ def _adopt_orphans() -> None:
         raise GroundStationError("processes can be started on Linux only")
 
 
+def share_one_arena() -> None:
+    """Let all threads of a process allocate from one place: one for each costs a megabyte a process."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc has it
+    if mallopt is not None:
+        mallopt(_ARENA_MAX, 1)
+
+
 def _has_threads() -> bool:
     """Whether this process has threads, be it of Python or of a library."""
     return len(list(Path("/proc/self/task").iterdir())) > 1
 
 
-def _serve(requests: socket.socket) -> None:
-    """Fork what is asked for, until the other end is closed."""
+def _serve(requests: socket.socket, modules: Iterable[str]) -> None:
+    """Load modules, then fork what is asked for, until the other end is closed."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -263,6 +282,12 @@ def _serve(requests: socket.socket) -> None:
     os.dup2(nothing, 1)
     os.close(nothing)
     _set_name("fork_server")
+    share_one_arena()
+    for module in modules:
+        importlib.import_module(module)
+    gc.collect()
+    gc.freeze()
+    requests.send(_LOADED)
     while True:
         asked, descriptors, _, _ = socket.recv_fds(requests, 1, 3)
         if not asked:
@@ -303,8 +328,7 @@ def _become(request: int, stdin: int, stderr: int) -> None:
     os.dup2(stdin, 0)
     os.dup2(stderr, 1)
     os.dup2(stderr, 2)
-    with open(f"/proc/self/fd/{request}", "rb") as file:  # by this name it is read from its beginning
-        pickled = file.read()
+    pickled = Path(f"/proc/self/fd/{request}").read_bytes()  # by this name it is read from its beginning
     _close_but(None)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115 the old one may have read ahead
     sys.stdout = sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115 open to the end
@@ -336,12 +360,7 @@ def _set_name(name: str) -> None:
 
 def main() -> None:
     """Serve as an interpreter of its own: number of the socket, then the modules to load."""
-    requests = socket.socket(fileno=int(sys.argv[1]))
-    for module in sys.argv[2:]:
-        importlib.import_module(module)
-    gc.collect()
-    gc.freeze()
-    _serve(requests)
+    _serve(socket.socket(fileno=int(sys.argv[1])), sys.argv[2:])
 
 
 if __name__ == "__main__":

@@ -15,20 +15,21 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import zenoh
-from groundstation.rig.rig import Rig
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus, open_hub
 from groundstation.declarations.errors import GroundStationError, RigError
+from groundstation.declarations.node import COMMANDS
+from groundstation.declarations.rig import Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
-from groundstation.launch.fork_server import ForkServer
+from groundstation.launch.fork_server import ForkServer, share_one_arena
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
+from groundstation.rig.read import bytes_of
 
 LABORATORY = "laboratory"
-COMMANDS = "commands"
 START_S = 30.0
 """A process that is not ready by then never will be."""
 HOPELESS = 4  # restarts of a process that was never ready
@@ -46,9 +47,9 @@ class Launcher:
 
     Args:
         rig: The rig.
-        rig_path: Its file.
-        rig_text: What the file said when the rig was read; holds, as do the files that it names, for the
+        rig_text: What its file said when the rig was read; holds, as do the files that it names, for the
             whole run.
+        rig_path: The file.
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
 
@@ -56,10 +57,10 @@ class Launcher:
         RigError: The rig names a laboratory that is not installed.
     """
 
-    def __init__(self, rig: Rig, rig_path: Path, rig_text: str, recording: Path | None, say: Say) -> None:
+    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path | None, say: Say) -> None:
         self._rig_path = rig_path
         self._rig_text = rig_text
-        self._files = rig.files()
+        self._files = bytes_of(rig)
         self._recording = recording
         self._say = say
         self._addresses: dict[str, Address] | None = None if rig.laboratory is not None else {}
@@ -73,23 +74,23 @@ class Launcher:
             self._package = _package_of(rig.laboratory.name)
         self._began_s = 0.0
         self._time = RunningTime()
-        self._fork_server = ForkServer((process.__name__, recorder.__name__))
+        self._fork_server = ForkServer(("groundstation.launch.preload",))
+        self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
         self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
     def start(self) -> None:
-        """Start everything; processes go once the laboratory has announced its ports."""
+        """Start what processes need; they are started, and go, as soon as that is there."""
         self._began_s = time.monotonic()
+        share_one_arena()
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
         self.endpoint, self._hub = _open_hub()
         self.bus = ZenohBus(self.endpoint)
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
-        for child in self._children.values():
-            self._start(child)
 
     @property
     def children(self) -> list[Child]:
@@ -137,6 +138,10 @@ class Launcher:
             self._say("the fork server has ended; another one was started, the processes go on")
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
+        if self._unstarted and self._fork_server.is_loaded:
+            for child in self._unstarted:
+                self._start(child)
+            self._unstarted.clear()
         self._let_go()
         for child in self._children.values():
             self._look_after(child, now_s)
@@ -179,10 +184,10 @@ class Launcher:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
 
     def _look_after(self, child: Child, now_s: float) -> None:
-        if child.name != RECORDER and self._addresses is None:
-            return  # it waits for the laboratory
+        if child.pid is None or (child.name != RECORDER and self._addresses is None):
+            return  # it waits for the fork server or the laboratory
         if child.restart_at_s is not None:
-            if now_s >= child.restart_at_s:
+            if now_s >= child.restart_at_s and self._fork_server.is_loaded:
                 child.restarts += 1
                 self._start(child)
         elif child.has_ended:
@@ -219,7 +224,7 @@ class Launcher:
             self._waiting.add(child.name)
 
     def _let_go(self) -> None:
-        """Tell processes to go once the ports are known and the recorder listens: a replay needs all bytes."""
+        """Tell processes to go once the ports are known and the recorder listens: replays need all bytes."""
         first = self._children.get(RECORDER)
         if self._addresses is None or not (first is None or first.has_been_ready):
             return

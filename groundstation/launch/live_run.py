@@ -1,4 +1,4 @@
-"""A whole live run of a rig: launcher, monitor and ledger; what the terminal view looks at."""
+"""A whole live run of a rig: launcher, monitor and latency; what the terminal view looks at."""
 
 import os
 import queue
@@ -6,20 +6,20 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from groundstation.bus.topics import TOPICS, Recorded, topic_named, topic_of
-from groundstation.messages import definitions as m
-from groundstation.messages.cdr import CodecError
-from groundstation.runtime.launcher import Launcher
-from groundstation.runtime.monitor import Monitor
-from groundstation.runtime.rig import Rig
-from groundstation.runtime.running import RunningRig
-
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.zenoh_bus import split_key
+from groundstation.bus.cdr import codec_of
+from groundstation.bus.envelope import Envelope
+from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
+from groundstation.bus.zenoh_bus import RECORD, split_key
+from groundstation.declarations.rig import Rig
+from groundstation.launch.launcher import Launcher
+from groundstation.launch.running import RunningRig
+from groundstation.parts.operation.messages import Latency
+from groundstation.watch.monitor import Monitor
 
 LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05
-_UNSEEN = (m.Journal, m.ImuRaw, m.FixBytes, m.ReferenceBytes, m.CanIn, m.CalibrationInUse)
+PROCESS = "launcher"
+"""Whose record stream the latency is in."""
 
 
 class LiveRun:
@@ -27,17 +27,19 @@ class LiveRun:
 
     Args:
         rig: The rig.
-        rig_path: Its file.
+        rig_text: What its file said when the rig was read.
+        rig_path: The file.
         recording: Where the recorder writes.
     """
 
-    def __init__(self, rig: Rig, rig_path: Path, recording: Path) -> None:
+    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path) -> None:
         self.rig = rig
         self.recording = recording
-        self.monitor = Monitor(tuple(rig.vehicles))
-        self.launcher = Launcher(rig, rig_path, recording, self.monitor.say)
+        self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
+        self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
-        self._heard: queue.SimpleQueue[tuple[str, bytes, bytes]] = queue.SimpleQueue()
+        self._batches: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
@@ -57,17 +59,14 @@ class LiveRun:
         self._announcement = run.announce()
         bus = self.launcher.bus
         assert bus is not None
-        for topic in TOPICS:
-            if topic.payload not in _UNSEEN and topic.recorded is Recorded.ALWAYS:
-                bus.subscribe(f"*/{topic.noun}", lambda *heard: self._heard.put(heard))
-        bus.subscribe(f"*/{topic_of(m.Journal).noun}", lambda key, *_: self.launcher.heard(split_key(key)[0]))
+        bus.subscribe(f"{RECORD}/*", self._receive)
 
     def step(self, duration_s: float) -> None:
-        """Supervise and listen for a while."""
+        """Supervise and take what is published for a while."""
         until_s = time.monotonic() + duration_s
         while (now_s := time.monotonic()) < until_s:
             self.launcher.supervise()
-            self._listen(min(until_s, now_s + POLL_S))
+            self._take(min(until_s, now_s + POLL_S))
             if now_s >= self._latency_due_s:
                 self._latency_due_s = now_s + LATENCY_PERIOD_S
                 self._publish_latency()
@@ -79,35 +78,49 @@ class LiveRun:
             self._announcement.unlink(missing_ok=True)
         self.launcher.close()
 
-    def _listen(self, until_s: float) -> None:
+    def _receive(self, key: str, batch: bytes, _attachment: bytes) -> None:
+        """A batch of a process, on Zenoh's thread."""
+        process = split_key(key)[1]
+        self.launcher.heard(process)
+        self._batches.put((process, batch))
+
+    def _take(self, until_s: float) -> None:
+        """Let the monitor have what comes, until a moment of the monotonic clock."""
         while (left_s := until_s - time.monotonic()) > 0:
             try:
-                key, data, attachment = self._heard.get(timeout=left_s)
+                process, batch = self._batches.get(timeout=left_s)
             except queue.Empty:
                 return
-            owner, noun = split_key(key)
-            topic = topic_named(noun)
-            try:
-                envelope = Envelope.unpack(topic, owner, attachment)
-                payload = topic.codec.decode(data)
-            except (CodecError, ValueError) as error:
-                self.monitor.say(f"undecodable message on {key}: {error}")
+            if process == PROCESS:
                 continue
-            if topic.latched:
-                if self._latched.get((owner, noun)) == envelope.sequence:
-                    continue
-                self._latched[owner, noun] = envelope.sequence
-            self.monitor.take(Delivered(envelope, payload), time.monotonic_ns())
+            try:
+                entries = read_batch(batch)
+            except BatchError as error:
+                self.monitor.note(f"{process}: {error}")
+                continue
+            now_ns = time.monotonic_ns()
+            for entry in entries:
+                if not self._is_repeated(entry):
+                    self.monitor.take(entry, now_ns)
+
+    def _is_repeated(self, entry: Recorded) -> bool:
+        """Whether it is a latched message that came before: publishers repeat them for late joiners."""
+        noun, owner, sequence = entry[:3]
+        if noun not in self._latching:
+            return False
+        is_repeated = self._latched.get((noun, owner)) == sequence
+        self._latched[noun, owner] = sequence
+        return is_repeated
 
     def _publish_latency(self) -> None:
+        """Publish the ledger's summaries, on their own keys and in a record stream."""
         bus = self.launcher.bus
         if bus is None:
             return
-        topic = topic_of(m.Latency)
         now_ns = time.monotonic_ns()
         self._sequence += 1
-        for vehicle in self.monitor.vehicles:
-            summary = self.monitor.ledger.summary(vehicle, now_ns)
-            self.monitor.vehicles[vehicle].newest[m.Latency] = summary
-            envelope = Envelope(topic, vehicle, self._sequence, now_ns)
-            bus.publish(envelope, topic.codec.encode(summary))
+        batch = RecordWriter()
+        for summary in self.monitor.summarise_latency(now_ns):
+            envelope = Envelope(Latency.TOPIC, summary.vehicle, self._sequence, now_ns)
+            batch.add(envelope, codec_of(Latency).encode(summary))
+        bus.publish_batch(PROCESS, batch.take())

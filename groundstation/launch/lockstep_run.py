@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.declarations.errors import UsageError
+from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.parts.operation.messages import Latency
 from groundstation.recording.errors import RecordingError
@@ -61,8 +61,10 @@ def run_lockstep(
         raise UsageError(str(error)) from error
     try:
         runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(tuple(rig.vehicles), recorder)])
-    except BaseException:
+    except BaseException as error:
         recorder.discard()
+        if isinstance(error, RigError):
+            raise RigError(f"{rig_path}: {error}") from error
         raise
     with recorder:
         try:

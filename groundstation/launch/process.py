@@ -8,8 +8,6 @@ import sys
 import threading
 from collections.abc import Callable
 
-from groundstation.rig.node_table import build_slots
-
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
@@ -17,10 +15,12 @@ from groundstation.declarations.errors import GroundStationError, RigError, Usag
 from groundstation.files.errors import CalibrationFileError
 from groundstation.launch.child import REFUSAL
 from groundstation.launch.orders import Go, Orders
+from groundstation.recording.policy import ImagePolicy
 from groundstation.rig.plan import gives_way, resolved_ports
 from groundstation.rig.read import parse_rig
 from groundstation.runners.live import LiveProcess
 from groundstation.runners.slot import Sequences
+from groundstation.runners.step import build_slots
 
 SWITCH_INTERVAL_S = 0.0005
 """How long a thread that computes may keep one that reads a port waiting; CPython's 5 ms is late."""
@@ -100,16 +100,17 @@ def run(orders: Orders) -> None:
     go = wait_for_go()
     if go is None:
         return
-    ports = [port for port in resolved_ports(rig, go.addresses) if port.process == orders.process]
+    ports = resolved_ports(rig, orders.process, go.addresses)
     with ZenohBus(orders.endpoint) as bus:
         process = LiveProcess(
             orders.process,
             slots,
             ports,
             bus,
+            rig.tables.payloads,
             journal,
             sequences,
-            publish_images=rig.record.images == "lossless",
+            images=ImagePolicy(rig.record.images),
         )
         stop_when_asked(process.stop)
         process.run()

@@ -4,13 +4,14 @@ import os
 import queue
 import sys
 import time
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
-from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
+from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
 from groundstation.bus.zenoh_bus import RECORD, ZenohBus
 from groundstation.declarations.errors import GroundStationError, UsageError
+from groundstation.declarations.message import Message
 from groundstation.launch.orders import Orders
 from groundstation.launch.process import NICENESS, obey, stop_when_asked
 from groundstation.recording.errors import RecordingError
@@ -38,20 +39,31 @@ def run(orders: Orders) -> None:
     assert orders.recording is not None
     os.nice(NICENESS)
     rig = parse_rig(orders.rig_text, orders.rig_path, orders.files)
-    info = recording_info(rig, orders.rig_path, seed=None, utc_offset_ns=orders.utc_offset_ns)
+    info = recording_info(rig, orders.rig_text, orders.rig_path, None, orders.utc_offset_ns)
     batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     stop_when_asked(lambda: batches.put(None))
-    recorder = _begin(orders.recording, replace(info, rig_toml=orders.rig_text))
-    try:
+    recorder = _begin(orders.recording, info)
+    with in_a_sentence(recorder):
         with ZenohBus(orders.endpoint) as bus:
             bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
             bus.announce(orders.process)
-            _record(recorder, batches, bus, orders.process)
+            write_until_end(recorder, batches, bus, orders.process, rig.tables.payloads)
         recorder.finish()
+
+
+@contextmanager
+def in_a_sentence(recorder: Recorder) -> Iterator[None]:
+    """Name what keeps a recording from being written any further.
+
+    Raises:
+        GroundStationError: The disk is full, or gone.
+    """
+    try:
+        yield
     except OSError as error:
         raise GroundStationError(
             f"{recorder.part_path} cannot be written any further: {error.strerror or error} "
-            f"(after {recorder.message_count} messages, which stay there)"
+            f"(after {recorder.message_count} messages; recovery brings back what is there)"
         ) from error
 
 
@@ -64,11 +76,14 @@ def _begin(path: Path, info: RecordingInfo) -> Recorder:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def _record(
-    recorder: Recorder, batches: "queue.SimpleQueue[bytes | None]", bus: ZenohBus, process: str
+def write_until_end(
+    recorder: Recorder,
+    batches: "queue.SimpleQueue[bytes | None]",
+    bus: ZenohBus,
+    process: str,
+    payloads: Mapping[str, type[Message]],
 ) -> None:
     """Write until the queue holds None."""
-    repeats = Repeats()
     sign_due_ns = 0
     while True:
         now_ns = time.monotonic_ns()
@@ -87,20 +102,6 @@ def _record(
         except BatchError as error:
             sys.stderr.write(f"not recorded: {error}\n")
             continue
-        recorder.record_batch(repeats.dropped(entries))
-
-
-class Repeats:
-    """Drops what a publisher repeats for late joiners: once in the recording is enough."""
-
-    def __init__(self) -> None:
-        self._newest: dict[tuple[str, str], tuple[int, int]] = {}
-
-    def dropped(self, entries: Iterable[Recorded]) -> Iterator[Recorded]:
-        """The entries without those that were the newest of their topic and owner before."""
-        newest = self._newest
-        for entry in entries:
-            topic, published = (entry.noun, entry.owner), (entry.sequence, entry.publish_ns)
-            if newest.get(topic) != published:
-                newest[topic] = published
-                yield entry
+        unknown = recorder.record_batch(entries, payloads)
+        if unknown:
+            sys.stderr.write(f"not recorded: {unknown} messages of topics that no part declares\n")

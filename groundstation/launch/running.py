@@ -12,7 +12,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.errors import GroundStationError, UsageError
 
 
 @dataclass(frozen=True)
@@ -87,3 +87,29 @@ def _lives(pid: int) -> bool:
         except ProcessLookupError:
             return False
     return True
+
+
+def choose_run(vehicle: str, pid: int | None) -> RunningRig:
+    """The run that flies a vehicle.
+
+    Args:
+        vehicle: Its name.
+        pid: Process of the run, where several fly one of that name.
+
+    Raises:
+        UsageError: There is none, or more than one.
+    """
+    runs = find_running()
+    if pid is not None:
+        runs = [run for run in runs if run.pid == pid]
+    if not runs:
+        whose = "" if pid is None else f" with process {pid}"
+        raise UsageError(f"no rig is running{whose}: start one with `groundstation run`")
+    fitting = [run for run in runs if vehicle in run.vehicles]
+    if not fitting:
+        known = ", ".join(name for run in runs for name in run.vehicles)
+        raise UsageError(f"no vehicle {vehicle!r} is running (running: {known})")
+    if len(fitting) > 1:
+        known = ", ".join(f"{run.pid} ({run.rig})" for run in fitting)
+        raise UsageError(f"several rigs fly a {vehicle!r}: choose one with --pid: {known}")
+    return fitting[0]

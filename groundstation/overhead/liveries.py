@@ -6,13 +6,15 @@ One table per mock-up: ``height_m`` of the circles above the table, their ``radi
 
 import itertools
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.toml_file import parse_toml
+from groundstation.files.values import number
 
 COLOURS = ("red", "green", "blue")
 MIN_DIFFERENCE_M = 0.02
@@ -87,22 +89,25 @@ def load_liveries(path: Path | str) -> tuple[Livery, ...]:
     """Read the circles of all mock-ups.
 
     Raises:
-        CalibrationFileError: The file is missing, no TOML, or a key is missing or impossible.
+        FileError: The file is missing, no TOML, or a key is missing or impossible.
     """
-    path = Path(path)
+    return parse_liveries(read_bytes(Path(path)), Path(path))
+
+
+def parse_liveries(data: bytes, path: Path) -> tuple[Livery, ...]:
+    """Read the content of the file of circles.
+
+    Raises:
+        FileError: It is no TOML, or a key is missing or impossible.
+    """
+    found = parse_toml(data, path)
+    if not found:
+        raise FileError(f"{path}: names no mock-up; expected a table like [alpha].")
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CalibrationFileError(f"{path}: is no TOML file ({error}).") from error
-    if not data:
-        raise CalibrationFileError(f"{path}: names no mock-up; expected a table like [alpha].")
-    try:
-        liveries = tuple(_livery(name, table) for name, table in data.items())
+        liveries = tuple(_livery(name, table) for name, table in found.items())
         check_distinct(liveries)
     except ValueError as error:
-        raise CalibrationFileError(f"{path}: {error}.") from error
+        raise FileError(f"{path}: {error}.") from error
     return liveries
 
 
@@ -114,21 +119,18 @@ def _livery(name: str, table: object) -> Livery:
     if not isinstance(circles, list) or len(circles) != _CIRCLES:
         raise ValueError(f"{name}.circles must be a list of three circles")
     made = []
-    for number, circle in enumerate(circles):
-        where = f"{name}.circles.{number}"
+    for i, circle in enumerate(circles):
+        where = f"{name}.circles.{i}"
         if not isinstance(circle, dict):
             raise ValueError(f"{where} must be a table with colour, x_m and y_m")
         _only(circle, where, ("colour", "x_m", "y_m"))
         try:
-            made.append(
-                Circle(
-                    str(circle.get("colour")), _number(circle, where, "x_m"), _number(circle, where, "y_m")
-                )
-            )
+            x_m, y_m = (number(circle, key, f"{where}.{key}") for key in ("x_m", "y_m"))
+            made.append(Circle(str(circle.get("colour")), x_m, y_m))
         except ValueError as error:
             message = str(error)
             raise ValueError(message if message.startswith(where) else f"{where}: {message}") from error
-    height_m, radius_m = (_number(table, name, key) for key in ("height_m", "radius_m"))
+    height_m, radius_m = (number(table, key, f"{name}.{key}") for key in ("height_m", "radius_m"))
     return Livery(name, (made[0], made[1], made[2]), height_m, radius_m)
 
 
@@ -136,14 +138,6 @@ def _only(table: Mapping[str, Any], where: str, keys: Sequence[str]) -> None:
     unknown = set(table) - set(keys)
     if unknown:
         raise ValueError(f"'{where}.{min(unknown)}' is no known key (a typo?)")
-
-
-def _number(table: Mapping[str, Any], where: str, key: str) -> float:
-    value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        found = "is missing" if key not in table else f"must be a finite number, found {value!r}"
-        raise ValueError(f"{where}.{key} {found}")
-    return float(value)
 
 
 def _look_alike(first: Livery, second: Livery) -> bool:

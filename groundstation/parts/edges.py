@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-from drivers.laboratory import CanFrame
 from groundstation.declarations.port import READ_TIMEOUT_S, Edge
 
 
@@ -26,7 +25,7 @@ class ByteEdge(Edge):
         stamp_ns, data = self._port.read_chunk(READ_TIMEOUT_S)
         return ((stamp_ns, data),) if data else ()
 
-    def write(self, data: bytes | CanFrame) -> None:
+    def write(self, data: object) -> None:
         assert isinstance(data, bytes)
         self._port.write(data)
 

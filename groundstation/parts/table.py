@@ -24,13 +24,14 @@ def installed_tables() -> Tables:
     from groundstation.parts.control.part import PART as CONTROL
     from groundstation.parts.fusion.part import PART as FUSION
     from groundstation.parts.imu.part import PART as IMU
+    from groundstation.parts.laboratory.part import PART as LABORATORY
     from groundstation.parts.operation.part import PART as OPERATION
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
     from groundstation.parts.stars.part import PART as STARS
     from groundstation.parts.valves.part import PART as VALVES
 
-    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, REFERENCE)
+    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE)
     points = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name)
     try:
         return Tables((*own, *map(_load, points)), topics=(Journal,))
@@ -39,7 +40,8 @@ def installed_tables() -> Tables:
 
 
 def _load(point: EntryPoint) -> Part:
-    where = f"the part {point.name!r} ({point.value})"
+    package = point.dist.name if point.dist is not None else point.module
+    where = f"the part {point.name!r} of the package {package} ({point.value})"
     try:
         part = point.load()
     except Exception as error:  # whatever a package of somebody else raises: it is named, once

@@ -5,6 +5,7 @@ or in another order), a codec made from the file's text reads the bytes, and the
 their names.
 """
 
+import struct
 from collections.abc import Callable
 from dataclasses import fields, make_dataclass
 from typing import Annotated, Any
@@ -26,22 +27,24 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
         where: Name of file and channel, for people.
 
     Raises:
-        RecordingError: The file's schema lacks a field of the class, or has it in another type.
+        RecordingError: The file's schema cannot be read, lacks a field of the class, or has it in another
+            type.
     """
     if recorded == schema_text(kind):
         return codec_of(kind).decode
     if is_standard(kind):
         raise RecordingError(f"{where} holds another type than {kind.ROS_TYPE}")
-    old = _fields(recorded)
+    try:
+        old = _fields(recorded)
+        codec = _codec(kind, old)
+    except (KeyError, TypeError, ValueError, struct.error) as error:
+        raise RecordingError(f"{where} has a schema that cannot be read ({error})") from error
     types = dict(old)
     for name, ros_type in _fields(message_text(kind)):
         if name not in types:
             raise RecordingError(f"{where} was recorded without the field '{name}'")
         if types[name] != ros_type:
             raise RecordingError(f"{where} was recorded with {name} as {types[name]}, expected {ros_type}")
-    columns = [(name, Annotated[Any, ros_type]) for name, ros_type in old]
-    made = make_dataclass(kind.__name__, columns, bases=(Message,), eq=False, frozen=True)
-    codec: Codec[Any] = Codec(made)
     wanted = [field.name for field in fields(kind)]
 
     def decode(data: bytes) -> Message:
@@ -49,6 +52,12 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
         return kind(**{name: getattr(found, name) for name in wanted})
 
     return decode
+
+
+def _codec(kind: type[Message], columns: list[tuple[str, str]]) -> Codec[Any]:
+    """The codec of a class as the file had it."""
+    annotated = [(name, Annotated[Any, ros_type]) for name, ros_type in columns]
+    return Codec(make_dataclass(kind.__name__, annotated, bases=(Message,), eq=False, frozen=True))
 
 
 def _fields(text: str) -> list[tuple[str, str]]:

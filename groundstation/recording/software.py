@@ -6,9 +6,9 @@ from groundstation.core.library import default_core
 
 
 def software() -> str:
-    """``groundstation``, the version of the installed package, and which code did the heavy work.
+    """``groundstation``, the version of the installed package, and the core by the hash of its sources.
 
-    Compiled core and NumPy agree within rounding, not bit for bit: a replay elsewhere has to know.
+    Another core may round otherwise: a replay elsewhere has to know.
     """
     try:
         release = version("groundstation")

@@ -14,6 +14,13 @@ from groundstation.rig.plan import nodes_of, ports_of
 
 HEADINGS = ("part", "topic", "rate", "published by", "in process", "received by")
 RUNNER = "the runner"
+PAGE = """# Parts and topics
+
+What the parts declare, whether or not a rig uses it; `*` stands for the name of a vehicle.
+`groundstation parts RIG` prints the same for one rig: what it uses, and in which process.
+
+This page is made by `groundstation parts --markdown > docs/parts.md`. Change the parts, not the page.
+"""
 OF_RUNNERS = frozenset({"journal", "latency"})
 
 
@@ -48,8 +55,15 @@ class TopicRow:
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """Parts and topics of a system."""
+    """Parts and topics of a system.
 
+    Attributes:
+        rig: Name of the rig, empty for all that parts declare.
+        parts: In the order of the table.
+        rows: Topics, in the order of the parts.
+    """
+
+    rig: str
     parts: tuple[Part, ...]
     rows: tuple[TopicRow, ...]
 
@@ -85,7 +99,7 @@ def overview(rig: Rig | None) -> Overview:
                 ),
             )
         )
-    return Overview(tuple(tables.parts.values()), tuple(rows))
+    return Overview("" if rig is None else rig.name, tuple(tables.parts.values()), tuple(rows))
 
 
 def _declared(tables: Tables) -> Iterable[_Spot]:
@@ -126,8 +140,11 @@ def _once(names: Iterable[str]) -> tuple[str, ...]:
 
 def as_markdown(view: Overview) -> str:
     """A page of the documentation."""
-    lines = ["| part | what it does |", "| --- | --- |"]
+    lines = [f"# Parts and topics of {view.rig}", ""] if view.rig else [*PAGE.splitlines(), ""]
+    lines += ["| part | what it does |", "| --- | --- |"]
     lines += [f"| `{part.name}` | {part.summary} |" for part in view.parts]
     lines += ["", f"| {' | '.join(HEADINGS)} |", f"| {' | '.join('---' for _ in HEADINGS)} |"]
-    lines += [f"| {' | '.join(row.cells())} |" for row in view.rows]
+    for row in view.rows:
+        cells = " | ".join(row.cells()).replace("*", r"\*")  # Markdown would take two of them for emphasis
+        lines.append(f"| {cells} |")
     return "\n".join(lines) + "\n"

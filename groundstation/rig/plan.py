@@ -124,6 +124,8 @@ def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
         if not isinstance(address, str) or not address.startswith(LABORATORY):
             raise RigError(f"{port.channel}: {address!r} is real hardware, which runs in real time only")
         channel = address.removeprefix(LABORATORY)
+        if port.is_optional and channel not in channels:
+            continue
         _check_channel(channel, channels)
         found.append(replace(port, channel=channel))
     return found
@@ -142,6 +144,8 @@ def resolved_ports(rig: Rig, process: str, addresses: Mapping[str, object]) -> l
         address = port.address
         if isinstance(address, str) and address.startswith(LABORATORY):
             channel = address.removeprefix(LABORATORY)
+            if port.is_optional and channel not in addresses:
+                continue
             _check_channel(channel, addresses)
             address = addresses[channel]
         found.append(replace(port, address=address))

@@ -7,6 +7,7 @@ launcher has read, so that what flies is what was hashed.
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
     Args:
         text: Of the file.
         path: Where it stands: relative paths inside start at its folder.
-        files: What the files that it names hold; None reads them from disk.
+        files: What the files that it names hold; None, and files that are not among them, read from disk.
         tables: Of the parts that its keys belong to; those installed by default.
 
     Raises:
@@ -97,6 +98,7 @@ def build_rig(
         raise
     except ValueError as error:
         raise RigError(f"{path}: {error}") from error
+    rig.keep_source(Source(content, path))
     return rig
 
 
@@ -119,6 +121,26 @@ def _files(where: str, value: object) -> Iterator[tuple[str, RigFile]]:
             yield from _files(f"{where}.{number}", item)
 
 
+@dataclass(frozen=True)
+class Source:
+    """What a rig was made from.
+
+    Attributes:
+        content: Keys of the file.
+        path: Of the file.
+    """
+
+    content: dict[str, Any]
+    path: Path
+
+
+def source_of(rig: Rig) -> Source:
+    """What a rig was made from."""
+    found = rig.source
+    assert isinstance(found, Source)
+    return found
+
+
 class _Reader:
     """Reads each file once, however many keys name it."""
 
@@ -136,10 +158,9 @@ class _Reader:
 
     def _bytes(self, path: Path) -> bytes:
         if self._given is not None:
-            try:
-                return self._given[os.path.abspath(path)]  # noqa: PTH100 - resolve() would follow links
-            except KeyError:
-                raise CalibrationFileError(f"{path}: was not among the files of the run.") from None
+            given = self._given.get(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
+            if given is not None:
+                return given
         try:
             return path.read_bytes()
         except OSError as error:

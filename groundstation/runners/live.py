@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import zenoh
@@ -65,6 +65,7 @@ class LiveProcess:
         journal: Shared with the slots.
         sequences: Shared with the slots.
         images: What of the cameras is recorded.
+        is_done: Asked after ticks; True ends the process.
     """
 
     def __init__(
@@ -78,11 +79,13 @@ class LiveProcess:
         sequences: Sequences,
         *,
         images: ImagePolicy,
+        is_done: Callable[[], bool] = lambda: False,
     ) -> None:
         self._process = process
         self._bus = bus
         self._payloads = payloads
         self._images = images
+        self._is_done = is_done
         self._decoder = Decoder(payloads)
         self._inbox = Inbox()
         self._stopping = threading.Event()
@@ -149,6 +152,8 @@ class LiveProcess:
                     self._step.tick(tick.slot, told_ns)
                     self._drain()
                     tick.advance(told_ns)
+                    if self._is_done():
+                        self.stop()
             if now_ns >= next_journal_ns:
                 self._send(self._step.take_journal(now_ns))
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS

@@ -65,7 +65,13 @@ class ReplayRunner:
             if key not in present:
                 known = ", ".join(present) or "none"
                 raise UsageError(f"{recording.path}: no node {key!r} is in the journal (there: {known})")
-            node = factory(key)
+            try:
+                node = factory(key)
+            except KeyError:
+                if nodes is not None:
+                    raise UsageError(f"{recording.path}: {key!r} is no node of the rig") from None
+                refused[key] = f"{key} is no node of the rig: it ran beside it"
+                continue
             reason = self._why_not(key, node)
             if reason is None:
                 prepared[key] = node

@@ -1,4 +1,4 @@
-"""From spots to a pose: tracking from a prior, or lost in space; in NumPy.
+"""From spots to a pose: tracking from a prior, or lost in space; one call of the core per picture.
 
 Lost in space: triangles of neighbouring spots are looked up among the catalogue's triangles; each hit
 is a pose; all poses are tested at once on the raster of nearest stars; the best are refined and must
@@ -6,40 +6,25 @@ pass the likelihood test. Pictures with few spots go on with pairs. The work is 
 that shows no ceiling costs a bounded time. With a prior, the stars near where it puts the spots are
 matched directly, and lost-in-space is the fallback.
 
-``compiled_search`` does the same in the compiled core, step by step, with equal answers.
+The steps are ``core/star_*.c``.
 """
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.core.library import default_core
+from groundstation.star_tracking import settings as constants
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, PoseGuess, PosePrior, StarFix
-from groundstation.star_tracking.hypotheses import (
-    NEIGHBOUR_RANKS,
-    RANK_GROUPS,
-    Poses,
-    pair_poses,
-    spot_triangles,
-    triangle_poses,
-)
-from groundstation.star_tracking.motion import smear_from_streaks, unbend
-from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
+from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.settings import TrackerSettings
-from groundstation.star_tracking.settling import Settler, Sighting
 from groundstation.star_tracking.sky_index import SkyIndex
 
-Complex = NDArray[np.complex128]
-
-_REFINED = 4  # of the poses of one look-up
-_RIVALS = 16  # so many are looked at for another place that would do as well
-_RIVAL_VOTES_RATIO = 0.8  # of the votes of the fix: with fewer a place is no rival
-_SAME_RAD = 0.03
-_TRIED_M, _TRIED_RAD = 0.05, 0.02  # poses nearer to each other than about this would refine to the same one
+_ROOM = 128  # spots to begin with; more come seldom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,28 +44,35 @@ class Found:
     is_ambiguous: bool = False
 
 
-class Search(Protocol):
-    """Finds the pose of enough spots; NumPy and the compiled core both do."""
-
-    def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found: ...
-
-
-class PureSearch:
-    """The search in NumPy.
+class Search:
+    """Finds the pose of enough spots; for one thread at a time, since it keeps its buffers.
 
     Args:
         sky: Tables over the catalogue.
         rays: Pixel to ceiling.
         settings: How hard to try.
-        is_dropped: Catalogue rows that no spot is matched to, and False for the star that is none,
-            shape (stars + 1,); the owner may change it between pictures.
+        is_dropped: Catalogue rows that no spot is matched to, and False for the star that is none, shape
+            (stars + 1,), contiguous; the owner may change it between pictures.
+
+    Raises:
+        CoreError: There is no compiled core.
     """
 
     def __init__(
         self, sky: SkyIndex, rays: CeilingRays, settings: TrackerSettings, is_dropped: NDArray[np.bool_]
     ) -> None:
-        self._sky, self._rays, self._settings = sky, rays, settings
-        self._settler = Settler(sky, rays, settings, is_dropped)
+        core = default_core()
+        self._lib, self._ffi = core.lib, core.ffi
+        self._held: list[Any] = []  # pointers that the structures hold, and with them their arrays
+        self._stars = len(sky.position_m)
+        self._rays = self._rays_of(rays)
+        self._sky = self._sky_of(sky, is_dropped)
+        self._settings = self._settings_of(settings)
+        self._picture = picture = self._ffi.new("StarPicture *")
+        self._cov, self._prior_cov = (
+            np.frombuffer(self._ffi.buffer(field)).reshape(3, 3) for field in (picture.cov, picture.prior_cov)
+        )
+        self._make_room(_ROOM)
 
     def find(self, spots: Spots, prior: PosePrior | None, motion: BodyMotion | None) -> Found:
         """Search one picture.
@@ -90,95 +82,123 @@ class PureSearch:
             prior: What is believed of the pose.
             motion: Velocity during the exposure.
         """
-        points = self._rays.look_up(spots.u_px, spots.v_px)
-        if motion is None or self._settings.exposure_s == 0.0:
-            smear = smear_from_streaks(points.q_body_m, spots.streak_px, points.jacobian_m_px)
-            if smear is not None:
-                points = CeilingPoints(unbend(points.q_body_m, smear), points.jacobian_m_px)
-        sighting = Sighting(spots, points, motion, self._settings.look_ups)
-        fix = None if prior is None else self._track(sighting, prior)
-        if fix is None and len(spots) >= self._settings.min_stars:
-            fix = self._lost_in_space(sighting)
-        return Found(fix, sighting.best_nats, sighting.best_guess, sighting.is_ambiguous)
+        n, picture = len(spots), self._picture
+        if n > self._room:
+            self._make_room(2 * n)
+        picture.spots = n
+        self._u_px[:n], self._v_px[:n] = spots.u_px, spots.v_px
+        self._cov_px2[:n], self._streak_px[:n] = spots.cov_px2, spots.streak_px
+        picture.has_prior = prior is not None
+        if prior is not None:
+            picture.prior_x_m, picture.prior_y_m = prior.x_table_m, prior.y_table_m
+            picture.prior_heading_rad = prior.heading_rad
+            self._prior_cov[:] = prior.cov
+        picture.has_motion = motion is not None
+        if motion is not None:
+            picture.vx_table_m_s, picture.vy_table_m_s = motion.vx_table_m_s, motion.vy_table_m_s
+            picture.omega_rad_s = motion.omega_rad_s
+        self._lib.gs_star_solve(self._sky, self._rays, self._settings, picture)
+        if not picture.is_fix:
+            guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
+            return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
+        stars = picture.stars
+        fix = StarFix(
+            x_m=picture.x_m,
+            y_m=picture.y_m,
+            heading_rad=picture.heading_rad,
+            cov=self._cov.copy(),
+            stars=stars,
+            mode=Mode.TRACKING if picture.is_tracked else Mode.LOST_IN_SPACE,
+            spot_index=self._spot_index[:stars].astype(np.int64),
+            star_index=self._star_index[:stars].astype(np.int64),
+            residual_m=self._residual_m[:stars].copy(),
+            evidence_nats=picture.evidence_nats,
+        )
+        return Found(fix, picture.best_nats, None)
 
-    def _track(self, sighting: Sighting, prior: PosePrior) -> StarFix | None:
-        turn, shift = np.exp(1j * prior.heading_rad), complex(prior.x_table_m, prior.y_table_m)
-        sigma = math.sqrt(max(prior.cov[0, 0], prior.cov[1, 1]))
-        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.cov[2, 2]))
-        gate = min(3.0 * sigma + 2.0 * self._sky.tolerance_m, 0.1)
-        return self._settler.settle(sighting, turn, shift, gate, prior)
+    def _make_room(self, spots: int) -> None:
+        """Allocate buffers for pictures of so many spots."""
+        self._room = spots
+        self._u_px, self._v_px = np.zeros(spots), np.zeros(spots)
+        self._cov_px2, self._streak_px = np.zeros((spots, 3)), np.zeros((spots, 2))
+        self._spot_index, self._star_index = np.zeros(spots, np.int32), np.zeros(spots, np.int32)
+        self._residual_m = np.zeros((spots, 2))
+        view, new = self._ffi.from_buffer, self._ffi.new
+        buffers = {
+            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("u_px", "v_px")},
+            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("cov_px2", "streak_px")},
+            **{name: view("int32_t[]", getattr(self, f"_{name}")) for name in ("spot_index", "star_index")},
+            "residual_m": view("Point[]", self._residual_m),
+            "doubles": new("double[]", self._lib.gs_star_doubles(spots)),
+            "integers": new("int32_t[]", self._lib.gs_star_integers(spots, self._stars, self._settings)),
+        }
+        for name, buffer in buffers.items():
+            setattr(self._picture, name, buffer)
+        self._buffers = buffers
 
-    def _lost_in_space(self, sighting: Sighting) -> StarFix | None:
-        q = sighting.points.q_body_m[: self._settings.identified_spots]
-        if len(q) > self._settings.min_stars:
-            for begin, end in pairwise((0, *RANK_GROUPS)):
-                poses = triangle_poses(self._sky, q, spot_triangles(q, NEIGHBOUR_RANKS[begin:end]))
-                fix = self._best(sighting, q, poses)
-                if fix is not None:
-                    return fix
-        if len(q) > self._settings.pair_spots_total or len(self._sky.pairs) == 0:
-            return None  # triangles fail on many spots only if they are no stars
-        q = q[: self._settings.pair_spots]
-        first, second = np.triu_indices(len(q), k=1)
-        usable = np.abs(q[first] - q[second]) < self._sky.pair_length_m[-1]
-        order = np.argsort(first + second, kind="stable")  # bright with bright first
-        for pair in order[usable[order]]:
-            if sighting.look_ups_left <= 0:
-                break
-            poses = pair_poses(self._sky, q, int(first[pair]), int(second[pair]))
-            fix = self._best(sighting, q, poses)
-            if fix is not None:
-                return fix
-        return None
+    def _pointer(self, to: str, array: NDArray[np.generic], kind: type[np.generic]) -> Any:  # noqa: ANN401
+        """Give a pointer to an array that lives as long as this object."""
+        self._held.append(self._ffi.from_buffer(f"{to}[]", np.ascontiguousarray(array, dtype=kind)))
+        return self._held[-1]
 
-    def _best(self, sighting: Sighting, q: Complex, poses: Poses) -> StarFix | None:
-        """Test all poses, settle the few that most spots agree with, and look for rivals of a fix.
+    def _doubles(self, array: NDArray[np.generic]) -> Any:  # noqa: ANN401
+        return self._pointer("double", array, np.float64)
 
-        A ceiling that repeats itself (LEDs in rows and columns) explains a picture in many places: of
-        such fixes the best one is believed only if it stands out.
-        """
-        room = max(sighting.look_ups_left // max(len(q), 1), 0)
-        turn, shift = poses.turn[:room], poses.shift_m[:room]
-        if len(turn) == 0:
-            return None
-        sighting.look_ups_left -= len(turn) * len(q)
-        _, distance = self._sky.nearest(turn[:, None] * q + shift[:, None])
-        votes = np.count_nonzero(distance < 2.0 * self._sky.tolerance_m, axis=1)
-        fix: StarFix | None = None
-        needed, rival_nats = float(self._settings.min_stars), -math.inf
-        for rank, candidate in enumerate(np.argsort(-votes, kind="stable")[:_RIVALS]):
-            if votes[candidate] < needed or (fix is None and rank >= _REFINED):
-                break
-            if fix is not None and self._is_same(q, turn[candidate], shift[candidate], fix):
-                continue
-            if len(sighting.tested) >= self._settings.candidates:
-                sighting.look_ups_left = 0
-                break
-            cell = (
-                round(shift[candidate].real / _TRIED_M),
-                round(shift[candidate].imag / _TRIED_M),
-                round(float(np.angle(turn[candidate])) / _TRIED_RAD),
-            )
-            if cell in sighting.tested:
-                continue
-            sighting.tested.add(cell)
-            gate = 2.5 * self._sky.tolerance_m
-            found = self._settler.settle(sighting, turn[candidate], shift[candidate], gate, None)
-            if found is None:
-                continue
-            if fix is None:
-                fix, needed = found, max(needed, _RIVAL_VOTES_RATIO * votes[candidate])
-            elif not self._is_same(q, np.exp(1j * found.heading_rad), complex(found.x_m, found.y_m), fix):
-                rival_nats = max(rival_nats, min(fix.evidence_nats, found.evidence_nats))
-                fix = max(fix, found, key=lambda one: one.evidence_nats)
-        if fix is not None and not fix.evidence_nats - rival_nats >= self._settings.rival_nats:
-            sighting.is_ambiguous = True
-            sighting.look_ups_left = 0
-            return None
-        return fix
+    def _integers(self, array: NDArray[np.generic]) -> Any:  # noqa: ANN401
+        return self._pointer("int32_t", array, np.int32)
 
-    def _is_same(self, q: Complex, turn: complex, shift: complex, fix: StarFix) -> bool:
-        """Whether a pose puts the spots about where a fix does: their middle, and the heading."""
-        fix_turn, middle = np.exp(1j * fix.heading_rad), q.mean()
-        off = abs((turn - fix_turn) * middle + shift - complex(fix.x_m, fix.y_m))
-        return bool(off < 4.0 * self._sky.tolerance_m and abs(turn - fix_turn) < _SAME_RAD)
+    def _rays_of(self, rays: CeilingRays) -> Any:  # noqa: ANN401
+        same = {name: getattr(rays, name) for name in ("columns", "rows", "step_px", "scale_m_px", "reach_m")}
+        made = {"table": self._doubles(rays.table), "picture_rows": rays.camera.height}
+        return self._ffi.new("Rays *", {**same, **made})
+
+    def _sky_of(self, sky: SkyIndex, is_dropped: NDArray[np.bool_]) -> Any:  # noqa: ANN401
+        if not is_dropped.flags.c_contiguous:
+            raise ValueError("the dropped stars must be one contiguous array, which is read in place")
+        triangles, raster = sky.triangles, sky.raster
+        rows, columns = raster.star.shape
+        return self._ffi.new(
+            "Sky *",
+            {
+                "star": self._pointer("Point", sky.padded_m, np.complex128),
+                "variance_m2": self._doubles(sky.variance_m2),
+                "is_dropped": self._pointer("uint8_t", is_dropped, np.bool_),
+                "stars": self._stars,
+                "raster": self._integers(raster.star),
+                "columns": columns,
+                "rows": rows,
+                "x0_m": raster.x0_m,
+                "y0_m": raster.y0_m,
+                "cells_per_m": 1.0 / raster.cell_m,
+                "area_m2": sky.area_m2,
+                "density_m2": sky.density_m2,
+                "tolerance_m": sky.tolerance_m,
+                "key_m": self._doubles(triangles.key_m),
+                "triangle": self._integers(triangles.star),
+                "starts": self._integers(triangles.starts),
+                "cells": triangles.cells,
+                "cell_m": triangles.cell_m,
+                "reach_m": triangles.reach_m,
+                "pair": self._integers(sky.pairs),
+                "pair_length_m": self._doubles(sky.pair_length_m),
+                "pairs": len(sky.pairs),
+            },
+        )
+
+    def _settings_of(self, settings: TrackerSettings) -> Any:  # noqa: ANN401
+        """Fill in the fields that are named alike, and the arrays."""
+        ranks = np.array(constants.NEIGHBOUR_RANKS)
+        groups, sigmas_px = constants.RANK_GROUPS, settings.evidence_sigmas_px
+        made = {
+            "sigmas_px": self._doubles(np.array(sigmas_px)),
+            "sigmas": len(sigmas_px),
+            "ranks": self._integers(ranks),
+            "rank_groups": self._integers(np.array(groups)),
+            "groups": len(groups),
+            "neighbours": int(ranks.max()) + 2,  # ranks count from 0, and every spot is its own nearest
+        }
+        for name, _ in self._ffi.typeof("SearchSettings").fields:
+            if name not in made:
+                is_setting = hasattr(settings, name)
+                made[name] = getattr(settings, name) if is_setting else getattr(constants, name.upper())
+        return self._ffi.new("SearchSettings *", made)

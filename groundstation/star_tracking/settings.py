@@ -2,7 +2,29 @@
 
 from dataclasses import dataclass
 
-from groundstation.star_tracking.evidence import SIGMAS_PX
+SIGMAS_PX = (0.06, 0.2, 0.7)
+"""Errors of a calibrated camera under a surveyed sky: from a bright star to a blurred one."""
+STRAY_RATIO = 0.5
+"""A spot is as likely a stray light as a star."""
+
+NEIGHBOUR_RANKS = ((0, 2), (1, 3), (0, 1), (2, 4), (1, 2), (0, 3), (3, 5), (2, 3), (1, 4), (0, 4))
+"""Ranks of the neighbours (0 = nearest) that form a triangle with each spot, the most useful first: not the
+very nearest alone, whose short arm tells the heading badly."""
+RANK_GROUPS = (2, 6, 10)
+"""They are tried in groups that end here."""
+
+PRIOR_FREEDOM = 6.0
+"""A-priori sigmas count like this many residuals when the scale is judged."""
+CLIP_SIGMAS = 3.0
+"""Of the robust scale; a few bad centres would otherwise rule the error."""
+REFINE_STEPS = 4
+
+MIN_STREAK_PX = 3.0
+MIN_STREAKS = 4
+MIN_STREAK_SHARE = 0.4
+"""Of all spots: a few oblong lights are no motion."""
+MAX_MISFIT_RATIO = 0.25
+SMEAR_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)

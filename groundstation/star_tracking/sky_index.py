@@ -1,6 +1,6 @@
 """Look-ups into the catalogue that do not grow with it.
 
-* ``nearest``: a raster over the ceiling; each cell names its nearest star, so that testing a pose is
+* ``raster``: over the ceiling; each cell names its nearest star, so that testing a pose is
   one table look-up per spot.
 * ``triangles``: every star as pivot with pairs (near, far) of its neighbours. A triangle's key is
   three lengths in the frame of its longer arm: arm length, and the near star along and across it.
@@ -90,17 +90,6 @@ class SkyIndex:
         order = np.argsort(length, kind="stable")
         self.pairs = pairs[order].astype(np.int32)
         self.pair_length_m = length[order]
-
-    def nearest(self, point_m: NDArray[np.complex128]) -> tuple[Index, NDArray[np.float64]]:
-        """Give the nearest star and its distance for points of any shape; distance inf if none is near."""
-        raster = self.raster
-        rows, columns = raster.star.shape
-        column = ((point_m.real - raster.x0_m) * (1.0 / raster.cell_m)).astype(np.int32)
-        row = ((point_m.imag - raster.y0_m) * (1.0 / raster.cell_m)).astype(np.int32)
-        np.clip(column, 0, columns - 1, out=column)
-        np.clip(row, 0, rows - 1, out=row)
-        star = raster.star.ravel()[row * columns + column]
-        return star, np.abs(point_m - self.padded_m[star])
 
 
 def _build_raster(points: NDArray[np.float64]) -> StarRaster:

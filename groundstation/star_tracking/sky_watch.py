@@ -19,8 +19,7 @@ from scipy.spatial import cKDTree
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import StarFix
-from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.refinement import spot_covariance
+from groundstation.star_tracking.rays import CeilingRays, spot_covariance
 from groundstation.star_tracking.sky_change import Change, Place, SkyChange
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.stray_lights import StrayLights, StraySettings

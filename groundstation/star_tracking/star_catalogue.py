@@ -1,18 +1,19 @@
 """The catalogue of ceiling LEDs: where each star is, and how well that is known."""
 
-import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.tables import parse_table
 
 MIN_STARS = 4
 """Below this no frame could be identified without a prior."""
 
+_PLACE, _SPREAD = ("x_m", "y_m"), ("std_x_m", "std_y_m")
 _TWIN_M = 1e-3  # two stars nearer than this are one star written down twice
 
 
@@ -70,51 +71,25 @@ class StarCatalogue:
         """Read ``ceiling.csv``: ``id,x_m,y_m`` and, from a survey, ``std_x_m,std_y_m``.
 
         Raises:
-            CalibrationFileError: The file is missing, or a column or a value of it is wrong.
+            FileError: The file is missing, or a column or a value of it is wrong.
         """
-        path = Path(path)
+        return cls.parse(read_bytes(Path(path)), Path(path))
+
+    @classmethod
+    def parse(cls, data: bytes, path: Path) -> "StarCatalogue":
+        """Read the content of ``ceiling.csv``.
+
+        Raises:
+            FileError: A column or a value of it is wrong.
+        """
+        table = parse_table(data, path, (*_PLACE, *_SPREAD), ("id",), optional=_SPREAD, unique=("id",))
+        x_m, y_m, *spread = (column.copy() for column in table.numbers.T)
+        given = [std for std in spread if not np.isnan(std).all()]
+        std_m = np.sqrt(np.mean(np.square(given), axis=0)) if given else np.zeros(len(x_m))
         try:
-            with path.open(newline="", encoding="utf-8") as file:
-                rows = list(csv.reader(file))
-        except OSError as error:
-            raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise CalibrationFileError(f"{path}: is not a CSV text file.") from error
-        if not rows:
-            raise CalibrationFileError(f"{path}: is empty; expected the header id,x_m,y_m.")
-        header = [name.strip() for name in rows[0]]
-        for name in ("id", "x_m", "y_m"):
-            if name not in header:
-                raise CalibrationFileError(f"{path}: column '{name}' is missing from its header.")
-        ids: list[str] = []
-        values: list[tuple[float, float, float]] = []
-        for line, row in enumerate(rows[1:], start=2):
-            if not row:
-                continue
-            if len(row) != len(header):
-                raise CalibrationFileError(
-                    f"{path}: line {line} has {len(row)} columns, expected {len(header)}."
-                )
-            fields = dict(zip(header, row, strict=True))
-            std = [_value(path, line, fields, name) for name in ("std_x_m", "std_y_m") if name in fields]
-            ids.append(fields["id"].strip())
-            x, y = _value(path, line, fields, "x_m"), _value(path, line, fields, "y_m")
-            values.append((x, y, math.sqrt(sum(s * s for s in std) / len(std)) if std else 0.0))
-        table = np.array(values, dtype=np.float64).reshape(-1, 3)
-        try:
-            return cls(tuple(ids), table[:, 0].copy(), table[:, 1].copy(), table[:, 2].copy())
+            return cls(tuple(table.words["id"]), x_m, y_m, std_m)
         except ValueError as error:
-            raise CalibrationFileError(f"{path}: {error}.") from error
-
-
-def _value(path: Path, line: int, fields: dict[str, str], name: str) -> float:
-    try:
-        value = float(fields[name])
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise CalibrationFileError(f"{path}: line {line}, {name} is '{fields[name]}', expected a number.")
-    return value
+            raise FileError(f"{path}: {error}.") from error
 
 
 def _twins(x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> tuple[int, int] | None:

@@ -5,13 +5,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.core.library import Core, default_core
 from groundstation.star_tracking.camera_model import CameraCalibration
-from groundstation.star_tracking.compiled_search import CompiledSearch
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
 from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.search import Found, PureSearch, Search
+from groundstation.star_tracking.search import Found, Search
 from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -29,7 +27,9 @@ class StarTracker:
         catalogue: The stars.
         camera: The camera, its mount and the height of the ceiling.
         settings: How hard to try.
-        core: Which code searches: None for the compiled core where there is one, ``PURE`` for NumPy.
+
+    Raises:
+        CoreError: There is no compiled core.
     """
 
     def __init__(
@@ -37,7 +37,6 @@ class StarTracker:
         catalogue: StarCatalogue,
         camera: CameraCalibration,
         settings: TrackerSettings | None = None,
-        core: Core | None = None,
     ) -> None:
         self.settings = settings or TrackerSettings()
         self.catalogue = catalogue
@@ -46,9 +45,7 @@ class StarTracker:
         tolerance_m += 2.0 * float(np.median(catalogue.std_m))
         self.sky = SkyIndex(catalogue, tolerance_m, self.rays.reach_m)
         self._is_dropped = np.zeros(len(catalogue) + 1, dtype=bool)  # one more: the star that is none
-        core = core or default_core()
-        parts = (self.sky, self.rays, self.settings, self._is_dropped)
-        self._search: Search = CompiledSearch(core, *parts) if core.is_compiled else PureSearch(*parts)
+        self._search = Search(self.sky, self.rays, self.settings, self._is_dropped)
 
     def drop(self, rows: NDArray[np.int64]) -> None:
         """Match no spot to these rows of the catalogue from now on, and to all others again."""

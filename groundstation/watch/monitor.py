@@ -8,8 +8,8 @@ when it comes; of the rest the newest bytes are kept until somebody looks.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.envelope import Delivered
@@ -17,50 +17,13 @@ from groundstation.bus.record_stream import Recorded
 from groundstation.declarations.message import Message
 from groundstation.declarations.tables import Tables
 from groundstation.declarations.topic import Scope
-from groundstation.declarations.view import Cell, Gauge, Newest
+from groundstation.declarations.view import Gauge
 from groundstation.parts.operation.messages import Diagnostics, Latency
 from groundstation.watch.health import Health
 from groundstation.watch.ledger import FOLLOWED, Ledger
+from groundstation.watch.vehicle_monitor import VehicleMonitor
 
 EVENTS_KEPT = 8
-
-
-@dataclass(slots=True)
-class VehicleMonitor:
-    """One vehicle: its gauges in the order of the view, and the newest messages that they look at."""
-
-    name: str
-    gauges: tuple[Gauge, ...]
-    garbled: Callable[[str, str, CodecError], None]
-    """Takes owner and noun of a message that cannot be decoded; the value before stays."""
-    newest: Newest = field(default_factory=Newest)
-    undecoded: dict[type[Message], bytes] = field(default_factory=dict)
-    is_known: bool = False
-    """Whether anything came from it."""
-
-    def labels(self) -> tuple[str, ...]:
-        """Of the rows."""
-        return tuple(gauge.label for gauge in self.gauges if gauge.label)
-
-    def rows(self, now_ns: int) -> list[Cell]:
-        """Cells in the order of ``labels``."""
-        self.refresh()
-        return [gauge.cell(self.newest, now_ns) for gauge in self.gauges if gauge.label]
-
-    def line(self, now_ns: int) -> str:
-        """The most important of it in one line of fixed columns."""
-        self.refresh()
-        phrases = (gauge.phrase(self.newest, now_ns) for gauge in self.gauges)
-        return "  ".join(phrase for phrase in phrases if phrase)
-
-    def refresh(self) -> None:
-        """Decode what came since somebody looked last."""
-        for kind, data in self.undecoded.items():
-            try:
-                self.newest.put(codec_of(kind).decode(data))
-            except CodecError as error:
-                self.garbled(self.name, kind.TOPIC.noun, error)
-        self.undecoded.clear()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,17 +67,17 @@ class Monitor:
         rows = sorted(
             (row for part in tables.parts.values() for row in part.gauges), key=lambda row: row.order
         )
+        self.lines: deque[str] = deque(maxlen=EVENTS_KEPT)
+        self._unread: list[str] = []
+        self.undecodable = 0
+        self._garbled: set[tuple[str, str]] = set()
         self.vehicles = {
-            name: VehicleMonitor(name, tuple(row.make(name) for row in rows), self._count_garbled)
+            name: VehicleMonitor(name, tuple(row.make(name) for row in rows), self.note, self._count_garbled)
             for name in vehicles
         }
         self.ledger = Ledger()
         self.health = Health()
         self.latency: dict[str, Latency] = {}
-        self.lines: deque[str] = deque(maxlen=EVENTS_KEPT)
-        self.undecodable = 0
-        self._unread: list[str] = []
-        self._garbled: set[tuple[str, str]] = set()
         self._routes = {
             noun: route for noun, kind in tables.payloads.items() if (route := self._route(kind)) is not None
         }
@@ -164,10 +127,8 @@ class Monitor:
     def look(self, now_ns: int) -> None:
         """Let the gauges find what is silent or wrong; call about once a second."""
         for vehicle in self.vehicles.values():
-            vehicle.refresh()
-            for gauge in vehicle.gauges:
-                for line in gauge.look(vehicle.newest, now_ns):
-                    self.note(line)
+            for line in vehicle.look(now_ns):
+                self.note(line)
 
     def summarise_latency(self, now_ns: int) -> Iterable[Latency]:
         """Make the ledger's summaries; call about once a second and publish what it returns."""
@@ -211,10 +172,8 @@ class Monitor:
                 vehicle.newest.count(kind, now_ns)
             if route.is_kept:
                 vehicle.newest.put(payload)
-        for owner in (name,) if name else self.vehicles:
-            for gauge in route.takers.get(owner, ()):
-                for event in gauge.take(payload, now_ns):
-                    events[event] = None
+            for event in vehicle.take(route.takers[vehicle.name], payload, now_ns):
+                events[event] = None
         for event in events:
             self.note(event)
 

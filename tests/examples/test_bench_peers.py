@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.estimator import PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.reintegration import ReintegrationEstimator

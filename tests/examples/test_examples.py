@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import groundstation.frames
-from firmware_emulator.faults import FAULT_KINDS
+from firmware_emulator.failures import FAILURE_KINDS
 from groundstation.rig.plan import processes_of
 from groundstation.rig.read import load_rig, parse_rig
 
@@ -132,6 +132,6 @@ def test_the_changes_for_real_hardware_make_a_rig_without_laboratory(page):
 
 def test_the_page_of_faults_names_every_kind_with_its_parameters():
     rows = (ROOT / "docs" / "how_to" / "break_things.md").read_text().splitlines()
-    for kind, row in FAULT_KINDS.items():
+    for kind, row in FAILURE_KINDS.items():
         line = next(line for line in rows if line.startswith(f"| `{kind}` |"))
         assert all(f"`{name}`" in line for name in row.parameters), line

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import NODES, make_node
+from groundstation.rig.plan import make_node, nodes_of
+from groundstation.rig.read import load_rig, parse_rig, read_text
 from groundstation.runners.replay import ReplayRunner, recorded_nodes
-from groundstation.rig.read import load_rig, parse_rig
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 
@@ -17,7 +17,7 @@ def record(folder, rig_name, seconds, seed, name="run"):
     """A recording of a lockstep run."""
     path = folder / f"{name}.mcap"
     rig_path = RIGS / f"{rig_name}.toml"
-    run_lockstep(load_rig(rig_path), rig_path, path, seconds, seed, lambda *_: None)
+    run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, seconds, seed, lambda *_: None)
     return path
 
 
@@ -45,7 +45,7 @@ def test_another_seed_gives_another_flight(flown, tmp_path):
 
 def test_every_node_of_a_flight_is_replayed_bit_for_bit(flown):
     keys, rig, report = replayed(flown)
-    assert keys == tuple(sorted(f"alpha/{row.name}" for row in NODES if row.vehicles(rig)))
+    assert keys == tuple(sorted(placed.key for placed in nodes_of(rig)))
     assert set(report.nodes) == set(keys)
     assert not report.missing_inputs
     assert report.agrees

@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from calibration.result import CalibrationResult, Provenance, Quantity
-from groundstation.bus.topics import topic_of
-from groundstation.cli.table_map_flights import read_source
+from calibration.table.smoothed_flights import read_source
 from groundstation.fusion.table_map import MapProvenance, TableMap
+from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.messages import FusionCalibration
 from groundstation.recording.reader import Recording
-from groundstation.runners.lockstep_run import run_lockstep
-from groundstation.runtime.node_table import make_node
+from groundstation.rig.plan import make_node
+from groundstation.rig.read import load_rig, parse_rig, read_text
 from groundstation.runners.replay import ReplayRunner
-from groundstation.rig.read import load_rig, parse_rig
 
 RIGS = Path(__file__).parents[2] / "examples" / "rigs"
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
@@ -32,7 +31,7 @@ def write_map(path, pull_m_s2):
 def replayed(path):
     with Recording(path) as recording:
         rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path))
-        found = [row.payload for row in recording.messages((FusionCalibration.TOPIC,), ("alpha",))]
+        found = [row.payload for row in recording.messages((FusionCalibration,), ("alpha",))]
         return found, recording.info, ReplayRunner(recording, lambda key: make_node(rig, key)).run()
 
 
@@ -47,10 +46,10 @@ def test_files_in_use_are_recorded_and_replay_is_exact_until_they_change(tmp_pat
     text = text.replace("baud = 250000", 'baud = 250000\ncalibration = ["imu.toml"]')
     rig_path, path = tmp_path / "rig.toml", tmp_path / "run.mcap"
     rig_path.write_text(text + "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n")
-    run_lockstep(load_rig(rig_path), rig_path, path, 5.0, 5, lambda *_: None)
+    run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, 5.0, 5, lambda *_: None)
 
     (said,), info, report = replayed(path)
-    assert said.names == ("table.map", "standard.imu.calibration.0")
+    assert said.names == ("table.map", "mock_ups.standard.imu.calibration.0")
     assert said.contents == (table_map.read_text(), imu.read_text())
     assert dict(zip(said.names, said.sha256, strict=True)).items() <= info.calibration_sha256.items()
     assert report.agrees

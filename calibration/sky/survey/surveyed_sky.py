@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.projection import project
 from calibration.sky.sky_adjustment import (
     CENTRE,
     DISTORTION,
@@ -34,6 +33,7 @@ from calibration.sky.survey.sweep_parts import (
 from calibration.sky.survey.tape import TapeError, fit_tape
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
+from groundstation.star_tracking.projection import project
 from groundstation.star_tracking.rays import CeilingRays
 
 __all__ = ["LENS", "Anchor", "SurveyError", "SurveyedSky", "shape_std_m", "survey"]

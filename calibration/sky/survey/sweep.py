@@ -7,21 +7,17 @@ from functools import partial
 
 import numpy as np
 
+from calibration.outcome import Outcome, adjusting
 from calibration.result import Quantity
 from calibration.sky.figures import draw_survey
-from calibration.sky.outcome import (
-    CalibrationRefusedError,
-    Outcome,
-    Progress,
-    adjusting,
-    silent,
-)
 from calibration.sky.quantities import camera_quantities
 from calibration.sky.residual_structure import ResidualStructure, find_structure
 from calibration.sky.sky_adjustment import HEIGHT
-from calibration.sky.survey.surveyed_sky import LENS, Anchor, SurveyedSky, SurveyError
+from calibration.sky.star_list import star_list_text, star_row
+from calibration.sky.survey.surveyed_sky import LENS, Anchor, SurveyedSky
 from calibration.sky.survey.surveyed_sky import survey as survey_sky
-from calibration.sky.survey.verification import Verification, none_of, verify
+from calibration.sky.survey.verification import Verification, none_of, sentence_of, verify
+from groundstation.cli.progress import Progress, silent
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 
@@ -45,13 +41,10 @@ class Survey:
     def catalogue_csv(self) -> str:
         """The star list's text: ``id,x_m,y_m,std_x_m,std_y_m,times_seen``."""
         sky = self.sky
-        lines = ["id,x_m,y_m,std_x_m,std_y_m,times_seen"]
-        for row in np.argsort(np.asarray(sky.ids, dtype=object), kind="stable"):
-            at, std = sky.star_m[row], sky.std_m[row]
-            lines.append(
-                f"{sky.ids[row]},{at[0]:.6f},{at[1]:.6f},{std[0]:.2e},{std[1]:.2e},{sky.times_seen[row]}"
-            )
-        return "\n".join(lines) + "\n"
+        order = np.argsort(np.asarray(sky.ids, dtype=object), kind="stable")
+        return star_list_text(
+            star_row(sky.ids[i], sky.star_m[i], sky.std_m[i], sky.times_seen[i]) for i in order
+        )
 
 
 def survey_sweep(
@@ -81,22 +74,19 @@ def survey_sweep(
         progress: Told how it goes.
 
     Raises:
-        CalibrationRefusedError: Anchors or overlaps do not suffice.
+        SurveyError: Anchors or overlaps do not suffice.
     """
     free = LENS if is_lens_free else HEIGHT
     step = adjusting(progress)
     progress("linking pictures", math.nan)
     verification = None
-    try:
-        if verify_every > 1:
-            needed = {anchor.frame for anchor in anchors}
-            held = [i for i in range(verify_every - 1, len(pictures), verify_every) if i not in needed]
-            blind = [none_of(spots) if i in held else spots for i, spots in enumerate(pictures)]
-            part = survey_sky(blind, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
-            verification = verify(part, [pictures[i] for i in held])
-        sky = survey_sky(pictures, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
-    except SurveyError as error:
-        raise CalibrationRefusedError(str(error)) from error
+    if verify_every > 1:
+        needed = {anchor.frame for anchor in anchors}
+        held = [i for i in range(verify_every - 1, len(pictures), verify_every) if i not in needed]
+        blind = [none_of(spots) if i in held else spots for i, spots in enumerate(pictures)]
+        part = survey_sky(blind, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
+        verification = verify(part, [pictures[i] for i in held])
+    sky = survey_sky(pictures, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
     used = sky.adjusted.used
     residual_px = sky.adjusted.residual_px[used]
     structure = find_structure(sky.seen.pixel[used], residual_px, camera.width, camera.height)
@@ -155,6 +145,8 @@ def _outcome(
         f"residual {sky.adjusted.rms_px:.3f} px, shape {1e3 * shape_m:.3f} mm (median sigma), "
         f"tape against pictures {1e3 * tape_m:.2f} mm, ceiling {height_m:.4f} m above the camera."
     )
+    if verification is not None:
+        summary = f"{sentence_of(verification)}\n{summary}"
     residual = {
         "reprojection_rms": Quantity(sky.adjusted.rms_px, math.nan, "px"),
         "systematic": Quantity(structure.systematic_px, math.nan, "px"),

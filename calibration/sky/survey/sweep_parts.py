@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.sky.survey.linking import LinkedMap, link
 from calibration.sky.survey.overlap import as_plane
 from groundstation.star_tracking.detection import Spots
@@ -24,7 +25,7 @@ _TWIN_REACH = 4.0  # gates: a star that a narrow gate has split has its twin so 
 _MAX_TWIN_RATIO = 0.05
 
 
-class SurveyError(ValueError):
+class SurveyError(CalibrationRefusedError):
     """The sweep or its anchors do not give a catalogue; the message is one sentence."""
 
 

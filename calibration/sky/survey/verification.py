@@ -63,6 +63,24 @@ class Verification:
         return self.clipped / self.spots if self.spots else math.nan
 
 
+def sentence_of(found: Verification) -> str:
+    """Return what a verification says, in words."""
+    if not found.solved:
+        return f"verification: none of {found.pictures} pictures held out could be solved."
+    words = (
+        f"verification: {found.solved} of {found.pictures} pictures held out solved, "
+        f"{1e3 * found.rms_m:.3f} mm per axis between star and spot "
+        f"({100.0 * found.matched_ratio:.1f} % of {found.spots} spots matched, "
+        f"{100.0 * found.clipped_ratio:.1f} % near a star but clipped)"
+    )
+    if found.worst_star:
+        words += (
+            f", {1e3 * found.star_std_m:.3f} mm of the stars themselves, "
+            f"star {found.worst_star} farthest off by {1e3 * found.worst_m:.2f} mm"
+        )
+    return words + "."
+
+
 def verify(sky: SurveyedSky, held: Sequence[Spots]) -> Verification:
     """Solve pictures with the stars of a survey that they had no part in."""
     x_m, y_m = sky.star_m.T

@@ -10,7 +10,7 @@ from groundstation.declarations.fix import Floor
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.rig_file import RigFile
 from groundstation.fusion.constants import noise_with_constants
-from groundstation.fusion.constants_file import ConstantsError, read_constants
+from groundstation.fusion.constants_file import ConstantsError, parse_constants, surest
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
 from groundstation.fusion.slope_grid import noise_with
 from groundstation.parts.fusion.sections import FusionOfVehicle
@@ -68,7 +68,7 @@ def rig_noise(rig: Rig, vehicle: str) -> NoiseModel:
     if not imu.calibration:
         return noise
     try:
-        found = read_constants([file.path for file in imu.calibration])
+        found = surest(file.value(parse_constants) for file in imu.calibration)
     except ConstantsError as error:
         raise ValueError(f"mock_ups.{rig.vehicles[vehicle].mock_up}.imu.calibration: {error}") from error
     return noise_with_constants(noise, found)
@@ -90,11 +90,11 @@ def floors_of(rig: Rig, vehicle: str) -> dict[str, Floor]:
 
 
 def calibration_files(rig: Rig, vehicle: str) -> Iterator[tuple[str, RigFile]]:
-    """Yield every calibration file of a vehicle's estimator by the name that the rig gives it."""
+    """Yield every calibration file of a vehicle's estimator by its key in the rig."""
     if rig.table.map is not None:
         yield "table.map", rig.table.map
     for number, file in enumerate(rig.of_type(vehicle, ImuOfType).imu.calibration):
-        yield f"{rig.vehicles[vehicle].mock_up}.imu.calibration.{number}", file
+        yield f"mock_ups.{rig.vehicles[vehicle].mock_up}.imu.calibration.{number}", file
 
 
 def calibration_texts(rig: Rig, vehicle: str) -> dict[str, tuple[str, str]]:

@@ -11,8 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
-from groundstation.fusion.error_state_filter import WAITS
-from groundstation.fusion.estimator import Estimator, Fix, ImuPacket, PlanarState
+from groundstation.fusion.estimator import WAITS, Estimator, Fix, ImuPacket, PlanarState
 from groundstation.fusion.estimator import FixAccount as Account
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
 from groundstation.parts.fusion.force_stand_in import ForceStandIn

@@ -1,14 +1,17 @@
 """Part ``fusion``: IMU samples and late fixes become the vehicle's state."""
 
+from collections.abc import Mapping
+
 from groundstation.control.valve_push import ValvePush
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimator import Estimator
 from groundstation.fusion.registry import ESTIMATORS
 from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
-from groundstation.parts.fusion.fusion import Fusion
+from groundstation.parts.fusion.fusion import NO_FILES, Fusion
 from groundstation.parts.fusion.gauges import FIGURES, GAUGES
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle
@@ -21,16 +24,21 @@ def _fusion(rig: Rig, vehicle: str) -> Node:
     type_ = rig.type_of(vehicle)
     push = ValvePush(type_.model(), type_.valves.open_delay_s, type_.valves.close_delay_s)
     stand_in = ForceStandIn(estimator, push, type_.mass_kg, type_.inertia_kg_m2)
-    payloads = {name: rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle)}
-    return Fusion(
-        vehicle,
-        estimator,
-        method,
-        payloads,
-        floors_of(rig, vehicle),
-        calibration_texts(rig, vehicle),
-        stand_in,
-    )
+    return fusion_node(rig, vehicle, estimator, method, calibration_texts(rig, vehicle), stand_in)
+
+
+def fusion_node(
+    rig: Rig,
+    vehicle: str,
+    estimator: Estimator,
+    method: str = "filter",
+    calibration: Mapping[str, tuple[str, str]] = NO_FILES,
+    stand_in: ForceStandIn | None = None,
+) -> Fusion:
+    """The fusion node of a vehicle around an estimator, with the fixes that the rig lets it take."""
+    sources = rig.tables.fix_sources
+    payloads = {name: sources[name].payload for name in fused_sources(rig, vehicle)}
+    return Fusion(vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration, stand_in)
 
 
 def _check(rig: Rig) -> None:

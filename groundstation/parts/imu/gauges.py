@@ -39,13 +39,9 @@ class ImuGauge(Gauge):
         yield from ()
 
     def look(self, newest: Newest, now_ns: int) -> Iterator[str]:
-        opened_ns = self._open_since_ns
-        was_bad = self._is_bad
-        self._is_bad = (
-            opened_ns is not None
-            and now_ns - opened_ns > SILENT_S * 1e9
-            and newest.rate_hz(Imu, now_ns) == 0.0
-        )
+        opened_ns, was_bad = self._open_since_ns, self._is_bad
+        comes = newest.rate_hz(Imu, now_ns) > 0.0
+        self._is_bad = opened_ns is not None and now_ns - opened_ns > SILENT_S * 1e9 and not comes
         if self._is_bad and not was_bad:
             what = (
                 "noise and no frame: another baud rate, or another device?"
@@ -53,7 +49,7 @@ class ImuGauge(Gauge):
                 else "open, but no byte comes: is the block switched on?"
             )
             yield f"{self._port}: {what} Listening on"
-        elif was_bad and not self._is_bad:
+        elif was_bad and comes:
             yield f"{self._port}: samples come"
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:

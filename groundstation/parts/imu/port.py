@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from drivers.laboratory import CanFrame
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Edge, Port
 from groundstation.parts.edges import ByteEdge
@@ -24,7 +23,7 @@ class ImuPort(Port):
     def writes(self) -> tuple[tuple[type[Message], str], ...]:
         return ((ImuOrder, self.vehicle),)
 
-    def to_device(self, payload: Message) -> bytes | CanFrame:
+    def to_device(self, payload: Message) -> object:
         assert isinstance(payload, ImuOrder)
         return payload.data
 

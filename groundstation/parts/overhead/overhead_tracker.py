@@ -13,7 +13,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.rig_file import RigFile
 from groundstation.frames import wrap_angle
 from groundstation.overhead import tracker as overhead
-from groundstation.overhead.liveries import load_liveries
+from groundstation.overhead.liveries import parse_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
@@ -43,7 +43,7 @@ class OverheadTracker(Node):
         self._vehicles = tuple(vehicles)
         self._files = (camera, circles)
         self._tracker = overhead.OverheadTracker(
-            camera.value(OverheadCamera.load), circles.value(load_liveries)
+            camera.value(OverheadCamera.parse), circles.value(parse_liveries)
         )
         self._delay = delay
 

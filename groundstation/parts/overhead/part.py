@@ -6,7 +6,7 @@ from groundstation.declarations.node import STATION, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import Rig, check_address
-from groundstation.overhead.liveries import load_liveries
+from groundstation.overhead.liveries import parse_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.parts.overhead.gauges import GAUGES, ComparisonFigure
 from groundstation.parts.overhead.messages import FixComparison, OverheadFix, OverheadImage
@@ -67,8 +67,8 @@ def _check(rig: Rig) -> None:
     if camera is None:
         return
     check_address(rig, "overhead_camera.address", camera.address)
-    camera.camera.value(OverheadCamera.load)
-    dressed = {livery.vehicle for livery in camera.circles.value(load_liveries)}
+    camera.camera.value(OverheadCamera.parse)
+    dressed = {livery.vehicle for livery in camera.circles.value(parse_liveries)}
     for vehicle in rig.vehicles:
         if vehicle not in dressed:
             raise ValueError(

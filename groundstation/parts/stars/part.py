@@ -65,7 +65,7 @@ def _fix_reader(rig: Rig, vehicle: str) -> Node:
 def _spot_finder(rig: Rig, vehicle: str) -> Node:
     from groundstation.parts.stars.spot_finder import SpotFinder  # OpenCV loads only where it is used
 
-    lens = _camera(rig, vehicle).camera.value(CameraCalibration.load)
+    lens = _camera(rig, vehicle).camera.value(CameraCalibration.parse)
     return SpotFinder(vehicle, (lens.width, lens.height))
 
 
@@ -102,8 +102,8 @@ def _check(rig: Rig) -> None:
         assert isinstance(type_, StarsOfType)
         camera = type_.star_camera
         if camera is not None:
-            camera.camera.value(CameraCalibration.load)
-            camera.ceiling.value(StarCatalogue.load)
+            camera.camera.value(CameraCalibration.parse)
+            camera.ceiling.value(StarCatalogue.parse)
             assert not any(map(math.isnan, camera.delay))
     for name, vehicle in rig.vehicles.items():
         own = rig.vehicle(name, StarsOfVehicle)

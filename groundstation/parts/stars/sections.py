@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
-from groundstation.star_tracking.stamp_delay import read_delay
+from groundstation.star_tracking.stamp_delay import parse_delay
 
 
 class StarCameraSection(Section):
@@ -26,18 +26,20 @@ class StarCameraSection(Section):
     sigma_xy_m: Positive = 0.001
     sigma_heading_rad: Positive = 0.0009
 
-    @model_validator(mode="after")
-    def _one_delay(self) -> Self:
-        if self.delay_file is not None and self.model_fields_set & {"delay_s", "delay_sigma_s"}:
+    @model_validator(mode="before")
+    @classmethod
+    def _one_delay(cls, given: object) -> object:
+        """Said before the file is looked for: which of the two was meant decides whether it must be there."""
+        if isinstance(given, dict) and "delay_file" in given and given.keys() & {"delay_s", "delay_sigma_s"}:
             raise ValueError("give either 'delay_file' or 'delay_s' and 'delay_sigma_s'")
-        return self
+        return given
 
     @property
     def delay(self) -> tuple[float, float]:
         """From the middle of the exposure to the picture's stamp, and its standard deviation, s."""
         if self.delay_file is None:
             return self.delay_s, self.delay_sigma_s
-        found = self.delay_file.value(read_delay)
+        found = self.delay_file.value(parse_delay)
         return found.delay_s, found.sigma_s
 
 

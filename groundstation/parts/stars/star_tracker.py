@@ -59,7 +59,7 @@ class StarTracker(Node):
     ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
-        self._stars, self._lens = ceiling.value(StarCatalogue.load), camera.value(CameraCalibration.load)
+        self._stars, self._lens = ceiling.value(StarCatalogue.parse), camera.value(CameraCalibration.parse)
         self._tracker = tracker.StarTracker(self._stars, self._lens, settings)
         self._watch = SkyWatch(self._stars, self._lens, rays=self._tracker.rays)
         self._governor = PriorGovernor()

@@ -37,17 +37,14 @@ class GateGauge(Gauge):
 
     def look(self, newest: Newest, now_ns: int) -> Iterator[str]:
         opened_ns, was_silent = self._open_since_ns, self._is_silent
-        self._is_silent = (
-            opened_ns is not None
-            and now_ns - opened_ns > SILENT_S * 1e9
-            and newest.rate_hz(ValveStatus, now_ns) == 0.0
-        )
+        comes = newest.rate_hz(ValveStatus, now_ns) > 0.0
+        self._is_silent = opened_ns is not None and now_ns - opened_ns > SILENT_S * 1e9 and not comes
         if self._is_silent and not was_silent:
             yield (
                 f"{self.vehicle}: nothing comes from its valve node; "
                 "while no command reaches it, it keeps its valves closed"
             )
-        elif was_silent and not self._is_silent:
+        elif was_silent and comes:
             yield f"{self.vehicle}: its valve node reports"
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:

@@ -51,7 +51,9 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
 def _guard(rig: Rig, vehicle: str) -> Node:
     limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
     gate = Gate(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
-    return Guard(vehicle, gate, frozenset(rig.tables.actions))
+    nodes = rig.tables.nodes
+    known = (row.name for row in rig.tables.actions.values() if nodes[row.answered_by].vehicles(rig))
+    return Guard(vehicle, gate, frozenset(known))
 
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:

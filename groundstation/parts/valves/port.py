@@ -19,7 +19,7 @@ class _CanEdge(Edge):
         found = self._bus.read(READ_TIMEOUT_S)
         return () if found is None else (found,)
 
-    def write(self, data: bytes | CanFrame) -> None:
+    def write(self, data: object) -> None:
         assert isinstance(data, CanFrame)
         self._bus.send(data)
 
@@ -42,7 +42,7 @@ class ValveBusPort(Port):
     def writes(self) -> tuple[tuple[type[Message], str], ...]:
         return tuple((CanOut, vehicle) for vehicle in self.vehicles)
 
-    def to_device(self, payload: Message) -> bytes | CanFrame:
+    def to_device(self, payload: Message) -> object:
         assert isinstance(payload, CanOut)
         return CanFrame(payload.arbitration_id, payload.data)
 

@@ -82,6 +82,7 @@ def test_it_is_a_laboratory_with_documented_channels():
     laboratory = EmulatedLaboratory(scenario(2), seed=1)
     assert isinstance(laboratory, Laboratory)
     assert laboratory.channels() == {
+        "laboratory": ChannelKind.FAILURES,
         "valve_bus": ChannelKind.CAN,
         **{
             f"{name}/{device}": ChannelKind.BYTES
@@ -249,7 +250,10 @@ def test_drawn_fixes_are_late_and_as_noisy_as_they_say():
         ({"vehicles": [{"name": "alpha"}], "tabel": {}}, "tabel"),
         ({"vehicles": [{"name": "alpha", "imu": {"averaging": 0}}]}, "vehicles.0.imu.averaging"),
         ({"vehicles": [{"name": "alpha", "mass_kg": -1.0}]}, "vehicles.0.mass_kg"),
-        ({"vehicles": [{"name": "alpha"}], "faults": [{"kind": "gremlin", "vehicle": "alpha"}]}, "faults.0"),
+        (
+            {"vehicles": [{"name": "alpha"}], "failures": [{"kind": "gremlin", "vehicle": "alpha"}]},
+            "failures.0",
+        ),
         ({"vehicles": [{"name": "alpha", "camera": {"source": "rendered"}}]}, "vehicles.0.camera"),
         (
             {

@@ -4,9 +4,7 @@ import selectors
 import socket
 import subprocess
 import sys
-import threading
 import time
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,11 +18,11 @@ from drivers.reference.protocol import PoseParser
 from drivers.star_camera.port import StarCamera
 from drivers.valve_bus.port import ValveBusPort
 from drivers.valve_bus.protocol import Arm, CanFrame, ValveStatus, decode, encode
+from firmware_emulator.device_kind import PictureOrder
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.live.cameras import CameraProcess
 from firmware_emulator.live.command import main
 from firmware_emulator.live.pty_port import PtyPort
-from firmware_emulator.live.server import LiveLaboratory
 from firmware_emulator.live.slcan import SlcanSession, encode_frame
 from firmware_emulator.live.tcp_server import MAX_WAITING_BYTES, TcpServer
 
@@ -33,19 +31,6 @@ FAST = {
     "imu": {"averaging": 10, "ftdi_latency_ms": 1},
     "camera": {"rate_hz": 20.0, "delay_s": 0.05},
 }
-
-
-@contextmanager
-def serving(config):
-    laboratory = LiveLaboratory(config, seed=1)
-    thread = threading.Thread(target=laboratory.run)
-    thread.start()
-    try:
-        yield laboratory.addresses
-    finally:
-        laboratory.stop()
-        thread.join()
-        laboratory.close()
 
 
 def frames_of(port, parser, count):
@@ -57,7 +42,7 @@ def frames_of(port, parser, count):
     return got
 
 
-def test_an_imu_driver_reads_a_live_block_and_is_answered():
+def test_an_imu_driver_reads_a_live_block_and_is_answered(serving):
     with serving({"vehicles": [FAST]}) as addresses, SerialPort(str(addresses["alpha/imu"])) as port:
         parser = FrameParser(2)
         frames = [item for item in frames_of(port, parser, 20) if isinstance(item, ImuFrame)]
@@ -68,7 +53,7 @@ def test_an_imu_driver_reads_a_live_block_and_is_answered():
         assert [item.serial_number for item in answered if isinstance(item, Identity)] == [1]
 
 
-def test_a_bus_driver_arms_a_live_node_and_several_clients_listen():
+def test_a_bus_driver_arms_a_live_node_and_several_clients_listen(serving):
     with (
         serving({"vehicles": [FAST]}) as addresses,
         ValveBusPort(addresses["valve_bus"]) as one,
@@ -80,7 +65,7 @@ def test_a_bus_driver_arms_a_live_node_and_several_clients_listen():
             assert next(m for m in heard if isinstance(m, ValveStatus) and m.is_armed)
 
 
-def test_truth_and_fixes_come_over_tcp_stamped_by_the_host_clock():
+def test_truth_and_fixes_come_over_tcp_stamped_by_the_host_clock(serving):
     with serving({"vehicles": [FAST]}) as addresses:
         for channel in ("alpha/reference", "alpha/fixes"):
             with SerialPort(str(addresses[channel])) as port:
@@ -90,7 +75,7 @@ def test_truth_and_fixes_come_over_tcp_stamped_by_the_host_clock():
 
 
 @pytest.mark.slow
-def test_pictures_come_raw_and_as_jpeg(emulated_scene):
+def test_pictures_come_raw_and_as_jpeg(serving, emulated_scene):
     camera = {"source": "rendered", "rate_hz": 20.0, "delay_s": 0.05, **emulated_scene}
     vehicles = [
         {**FAST, "camera": camera},
@@ -109,11 +94,9 @@ def test_pictures_come_raw_and_as_jpeg(emulated_scene):
 
 @pytest.mark.slow
 def test_a_killed_camera_process_comes_back_on_its_port(emulated_scene):
-    row = {
-        "name": "alpha", "exposure_s": 0.01, "readout_s": 0.0, "jpeg_quality": 90, "sky_seed": [1],
-        "camera_seed": [2], **emulated_scene,
-    }  # fmt: skip
-    cameras = CameraProcess([row])
+    arguments = {"exposure_s": 0.01, "readout_s": 0.0, "sky_seed": [1], "camera_seed": [2], **emulated_scene}
+    renderer = "firmware_emulator.devices.sky_renderer:SkyRenderer"
+    cameras = CameraProcess([PictureOrder("alpha", renderer, arguments, "raw", 90)])
     try:
         url = cameras.url("alpha", "raw")
         first = cameras._child
@@ -170,7 +153,7 @@ def start(tmp_path, text):
 def test_the_process_announces_its_ports_and_leaves_none_behind(tmp_path, ending):
     with start(tmp_path, '[[laboratory.vehicles]]\nname = "alpha"\n') as process:
         addresses = parse_announcement(process.stdout.readline())
-        assert set(addresses) == {"valve_bus", "alpha/imu", "alpha/reference", "alpha/fixes"}
+        assert set(addresses) == {"laboratory", "valve_bus", "alpha/imu", "alpha/reference", "alpha/fixes"}
         pty = Path(addresses["alpha/imu"])
         assert pty.exists()
         if ending == "terminate":
@@ -191,8 +174,8 @@ def test_the_process_announces_its_ports_and_leaves_none_behind(tmp_path, ending
         ("[laboratory", "is no TOML file"),
         ("[station]\nx = 1\n", "has no table [laboratory]"),
         ('[[laboratory.vehicles]]\nname = "alpha"\nmas_kg = 1\n', "laboratory.vehicles.0.mas_kg"),
-        ('[[laboratory.vehicles]]\nname = "alpha"\n[[laboratory.faults]]\nkind = "x"\nvehicle = "alpha"\n',
-         "no fault of kind 'x'"),
+        ('[[laboratory.vehicles]]\nname = "alpha"\n[[laboratory.failures]]\nkind = "x"\nvehicle = "alpha"\n',
+         "no failure of kind 'x'"),
         ('[[laboratory.vehicles]]\nname = "alpha"\ncamera = {source = "rendered", ceiling = "no.csv", '
          'camera = "no.json"}\n', "no.csv"),
     ],

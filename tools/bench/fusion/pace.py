@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 
 from bench.unit import blur_s, picture
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.estimator import EstimatorFactory, Fix, ImuPacket
 
 NS = 1e9

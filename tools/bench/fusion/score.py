@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import FusionFolder, read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.estimator import EstimatorFactory, FixAccount, PlanarState
+from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.offline import OfflineSmoother
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ def flown(folder: Path, factory: EstimatorFactory, *, is_cleaned: bool = False) 
 
 
 def judge(
-    folder: Path, data: FusionFolder, states: Sequence[PlanarState | None], accounts: Sequence[FixAccount]
+    folder: Path, data: FlightData, states: Sequence[PlanarState | None], accounts: Sequence[FixAccount]
 ) -> Figures:
     """Compare with truth.csv and the truth block of meta.json."""
     truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)

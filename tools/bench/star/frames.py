@@ -11,16 +11,13 @@ from bench.rows import Bench, Row
 from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, TAGS, Frame, Laboratory
 from bench.star.report import rows_of
 from bench.star.score import run
-from groundstation.core.library import PURE
 from groundstation.star_tracking.camera_model import CameraCalibration
-from groundstation.star_tracking.detection import Detector, detect
+from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
 SEED = 1
 JPEG_QUALITY = 90
-PURE_EACH = 4
-"""Of the pictures, one in so many is solved without the compiled core too."""
 _WARM = 20
 
 
@@ -35,7 +32,6 @@ def measure(bench: Bench) -> list[Row]:
     for frame in frames[:_WARM]:
         tracker.solve(detect(frame.image))
     rows = rows_of(run(frames, tracker.solve, bench.say), "star")
-    rows.append(_pure_row(frames[::PURE_EACH], bench))
     for tag in ("easy", "blur"):
         squeezed = through_jpeg([frame for frame in frames if frame.tag == tag])
         score = run(squeezed, tracker.solve, bench.say)
@@ -46,16 +42,6 @@ def measure(bench: Bench) -> list[Row]:
             plain(f"{what}: identified", score.rate(tag), "%", f"{score.false} false"),
         ]
     return rows
-
-
-def _pure_row(frames: Sequence[Frame], bench: Bench) -> Row:
-    """What a machine without a C compiler takes."""
-    camera, catalogue = CameraCalibration.load(CAMERA_FILE), StarCatalogue.load(CEILING_FILE)
-    tracker = StarTracker(catalogue, camera, core=PURE)
-    score = run(frames, tracker.solve, bench.say, Detector(core=PURE))
-    times = np.percentile(score.total_ms, [50, 99]).tolist()
-    note = f"{' / '.join(map(score.units, times))} units"
-    return plain("star, without the compiled core: total CPU, median / p99", times, "ms", note)
 
 
 def through_jpeg(frames: Sequence[Frame]) -> list[Frame]:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rows import ROOT
-from calibration.sky.sky_adjustment import project
 from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
 from firmware_emulator.sky.sensor import SensorSettings
 from firmware_emulator.sky.sky_camera import Shutter, SkyCamera
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
+from groundstation.star_tracking.projection import project
 
 RIG = ROOT / "calibration" / "rigs" / "emulated"
 CAMERA_FILE, CEILING_FILE = RIG / "camera.json", RIG / "ceiling.csv"

@@ -114,17 +114,15 @@ def run(
     frames: Sequence[Frame],
     solve: Solver,
     say: Callable[[str], None] | None = None,
-    detector: Detector | None = None,
 ) -> Score:
     """Detect and solve every picture, each on its own."""
-    return run_beside(frames, {"": solve}, say, detector)[""]
+    return run_beside(frames, {"": solve}, say)[""]
 
 
 def run_beside(
     frames: Sequence[Frame],
     solvers: Mapping[str, Solver],
     say: Callable[[str], None] | None = None,
-    detector: Detector | None = None,
 ) -> dict[str, Score]:
     """Let several methods solve every picture, one after the other, so that all see the same machine.
 
@@ -134,10 +132,9 @@ def run_beside(
         frames: Pictures with truth.
         solvers: Name to method.
         say: Takes progress.
-        detector: Finds the spots, whose time is each method's too.
     """
     scores = {name: Score() for name in solvers}
-    find = (detector or Detector()).find
+    find = Detector().find
     find(frames[0].image)  # the first call pays for memory
     gc.freeze()
     for number, frame in enumerate(frames):

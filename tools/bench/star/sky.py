@@ -13,11 +13,11 @@ from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, Laboratory, spots_a
 from bench.star.score import run
 from bench.unit import blur_s, picture
 from calibration.sky.self_calibration import calibrate_intrinsics
-from calibration.sky.sky_adjustment import project
 from calibration.sky.survey.surveyed_sky import Anchor, survey
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
 from groundstation.star_tracking.fixes import BodyMotion, StarFix
+from groundstation.star_tracking.projection import project
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 

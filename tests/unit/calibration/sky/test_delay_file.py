@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.runtime import factories
+from groundstation.runtime.ports import ports_of
 
 from calibration.result import provenance_of
 from calibration.sky.delay import delay_from_headings
-from groundstation.files.errors import CalibrationFileError
-from groundstation.runtime import factories
-from groundstation.runtime.ports import ports_of
-from groundstation.runtime.rig import parse_rig
+from groundstation.files.errors import FileError
+from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 
 RIG = Path(__file__).parents[4] / "examples" / "rigs" / "published.toml"
@@ -80,7 +80,7 @@ def test_the_rig_hands_the_measured_delay_to_the_stamps_and_its_spread_to_fusion
 )
 def test_a_wrong_delay_file_is_refused_in_one_sentence(delay_file, old, new, words):
     delay_file.write_text(delay_file.read_text().replace(old, new, 1))
-    with pytest.raises(CalibrationFileError) as refusal:
+    with pytest.raises(FileError) as refusal:
         read_delay(delay_file)
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
@@ -90,5 +90,5 @@ def test_a_wrong_delay_file_is_refused_in_one_sentence(delay_file, old, new, wor
 def test_an_impossible_delay_is_refused(tmp_path, value):
     path = tmp_path / "delay.toml"
     path.write_text(f'[delay]\nvalue = {value}\nstd = 0.001\nunit = "s"\n')
-    with pytest.raises(CalibrationFileError, match=r"value of \[delay\] is"):
+    with pytest.raises(FileError, match=r"value of \[delay\] is"):
         read_delay(path)

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from calibration.sky.survey.linking import link
 from calibration.sky.survey.overlap import Constellation, find_overlap
-from groundstation.frames import rigid_fit
 from calibration.sky.survey.tape import TapeError, fit_tape
 from calibration.sky.survey.triangles import neighbour_triangles
+from groundstation.frames import rigid_fit
 
 GATE_M = 0.006
 NOISE_M = 3e-4

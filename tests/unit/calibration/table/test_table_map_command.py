@@ -2,15 +2,16 @@
 
 import json
 import math
+import re
 import tomllib
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.table_map import app
+from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
 from groundstation.fusion.table_map import TableMap
-from groundstation.runtime.errors import UsageError
+from groundstation.recording.errors import RecordingError
 
 LEGS = ("--leg", "A:-1.5,-1", "--leg", "B:1.5,-1", "--leg", "C:0,1")
 KNOWN = {
@@ -61,11 +62,12 @@ def folder(tmp_path, made_table, fly):
     return path
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+@pytest.fixture
+def run(groundstation):
+    return lambda *words: groundstation("calibrate", "table-map", *words)
 
 
-def test_a_folder_becomes_a_map_a_picture_and_advice(folder, tmp_path, made_table):
+def test_a_folder_becomes_a_map_a_picture_and_advice(run, folder, tmp_path, made_table):
     out, plot = tmp_path / "map.toml", tmp_path / "map.png"
     done = run(
         folder, "--out", out, "--plot", plot, *LEGS, "--shortest-wave-m", "0.6", "--bounds", "-1.5,1.5,-1,1"
@@ -88,7 +90,7 @@ def test_a_folder_becomes_a_map_a_picture_and_advice(folder, tmp_path, made_tabl
     assert sorted(p.name for p in tmp_path.iterdir()) == ["laps", "map.npz", "map.png", "map.toml"]
 
 
-def test_the_check_on_a_flight_is_told(folder, tmp_path):
+def test_the_check_on_a_flight_is_reported(run, folder, tmp_path):
     done = run(folder, "--out", tmp_path / "map.toml", "--check", folder, "--shortest-wave-m", "0.8")
     assert done.exit_code == 0, done.output
     assert "laps: " in done.stdout
@@ -107,25 +109,22 @@ def test_the_check_on_a_flight_is_told(folder, tmp_path):
         (("--shortest-wave-m", "0.01"), "within 0.15 and 5 m"),
     ],
 )
-def test_wrong_options_are_refused_before_anything_is_read(tmp_path, arguments, complaint):
-    done = run(tmp_path / "nothing", "--out", tmp_path / "map.toml", *arguments)
-    assert isinstance(done.exception, UsageError)
-    assert complaint in str(done.exception)
+def test_wrong_options_are_refused_before_anything_is_read(run, tmp_path, arguments, complaint):
+    with pytest.raises(UsageError, match=re.escape(complaint)):
+        run(tmp_path / "nothing", "--out", tmp_path / "map.toml", *arguments)
 
 
-def test_wrong_inputs_are_refused_and_nothing_is_written(folder, tmp_path):
-    for path, complaint in (
-        (tmp_path / "none.mcap", "cannot be opened"),
-        (folder / "imu.csv", "no MCAP file"),
-        (tmp_path, "meta.json is missing"),
+def test_wrong_inputs_are_refused_and_nothing_is_written(run, folder, tmp_path):
+    for path, refusal, complaint in (
+        (tmp_path / "none.mcap", RecordingError, "cannot be opened"),
+        (folder / "imu.csv", RecordingError, "no MCAP file"),
+        (tmp_path, FileError, r"meta\.json: cannot be read"),
     ):
-        done = run(path, "--out", tmp_path / "map.toml", "--plot", tmp_path / "map.png")
-        assert isinstance(done.exception, UsageError), path
-        assert complaint in str(done.exception)
+        with pytest.raises(refusal, match=complaint):
+            run(path, "--out", tmp_path / "map.toml", "--plot", tmp_path / "map.png")
     (folder / "stars.csv").write_text("t_exposure_s,t_arrival_s,x_m,y_m,heading_rad\n1,2,0,0,0\n2,3,1,1,1\n")
-    done = run(folder, "--out", tmp_path / "map.toml")
-    assert isinstance(done.exception, UsageError)
-    assert "never had a pose" in str(done.exception)
-    done = run(folder, "--out", tmp_path / "nowhere" / "map.toml")
-    assert isinstance(done.exception, UsageError)
+    with pytest.raises(UsageError, match="never had a pose"):
+        run(folder, "--out", tmp_path / "map.toml")
+    with pytest.raises(FileError, match="there is no folder"):
+        run(folder, "--out", tmp_path / "nowhere" / "map.toml")
     assert [path.name for path in tmp_path.iterdir()] == ["laps"]

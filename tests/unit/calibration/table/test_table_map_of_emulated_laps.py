@@ -9,14 +9,14 @@ import pytest
 
 from calibration.table.equations import FlightPriors, flight_equations
 from calibration.table.prediction import check_outages
+from calibration.table.smoothed_flights import read_source
 from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import fit_surface
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
-from groundstation.cli.table_map_flights import read_source
 from groundstation.recording.writer import Recorder
-from groundstation.runtime.provenance import recording_info
-from groundstation.runtime.rig import load_rig
+from groundstation.rig.provenance import recording_info
+from groundstation.rig.read import load_rig
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 SEED = 4

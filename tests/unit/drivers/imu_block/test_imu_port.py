@@ -18,7 +18,7 @@ from drivers.imu_block.identify import ask_url
 from drivers.imu_block.port import SerialPort
 from drivers.imu_block.protocol import CommandParser, Identify, Identity, encode_reply, encode_v1, encode_v2
 from groundstation.cli.devices import app
-from groundstation.cli.errors import UsageError
+from groundstation.declarations.errors import UsageError
 
 
 @pytest.fixture

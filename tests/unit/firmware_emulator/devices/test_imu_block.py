@@ -24,10 +24,10 @@ S = 1_000_000_000
 DONE, BAD_ARGUMENT = 0, 2
 
 
-def block(faults=(), **imu):
+def block(failures=(), **imu):
     vehicle = {"name": "alpha", "imu": {"ftdi_latency_ms": 1, **imu}, "camera": {"source": "none"}}
-    rows = [{"vehicle": "alpha", **fault} for fault in faults]
-    return EmulatedLaboratory({"vehicles": [vehicle], "faults": rows}, seed=4)
+    rows = [{"vehicle": "alpha", **failure} for failure in failures]
+    return EmulatedLaboratory({"vehicles": [vehicle], "failures": rows}, seed=4)
 
 
 def talk(laboratory, until_ns, commands=(), parser=None):
@@ -57,7 +57,7 @@ def test_it_starts_with_rubbish_then_the_first_tick():
 def test_a_frame_leaves_half_a_millisecond_after_its_tick_and_takes_its_bytes_time():
     laboratory = block(clock_ppm=0.0, host_jitter_s=0.0, averaging=10)
     stamps = [a.stamp_ns for a in laboratory.advance(S) if a.channel == "alpha/imu"][1:]
-    edge_ns = laboratory.mock_ups[0].imu._grid.stamp_ns(10)
+    edge_ns = laboratory.mock_ups[0].grid.stamp_ns(10)
     assert stamps[0] == edge_ns + 500_000 + 40_000 + MS  # first byte, then the timer; 21 bytes take 0.84 ms
     assert {b - a for a, b in pairwise(stamps)} == {10 * MS}
 

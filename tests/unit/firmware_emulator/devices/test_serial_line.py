@@ -4,14 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_emulator.devices.serial_line import SerialLine
-from firmware_emulator.faults import Fault, Faults
+from firmware_emulator.failures import Failure, Failures
 
 MS = 1_000_000
 S = 1_000_000_000
 
 
-def line(baud=250000, latency_ms=16, jitter_s=0.0, faults=(), seed=0):
-    return SerialLine(baud, latency_ms * 1e-3, jitter_s, Faults(faults), np.random.default_rng(seed))
+def line(baud=250000, latency_ms=16, jitter_s=0.0, failures=(), seed=0):
+    return SerialLine(baud, latency_ms * 1e-3, jitter_s, Failures(failures), np.random.default_rng(seed))
 
 
 def test_bytes_take_their_time_and_wait_for_the_timer():
@@ -76,14 +76,14 @@ def test_jitter_has_its_mean():
 
 
 def test_flipped_bits_come_at_their_rate():
-    usb = line(faults=[Fault("bit_flips", 0, None, {"probability_per_bit": 0.01})])
+    usb = line(failures=[Failure("bit_flips", 0, None, {"probability_per_bit": 0.01})])
     usb.send(0, bytes(20_000))
     flipped = sum(int(byte).bit_count() for _, chunk in usb.take(100 * S) for byte in chunk)
     assert flipped == pytest.approx(1600, rel=0.1)
 
 
-def test_bytes_get_lost_at_their_rate_and_only_while_the_fault_lasts():
-    usb = line(faults=[Fault("lost_bytes", S, 2 * S, {"probability_per_byte": 0.2})])
+def test_bytes_get_lost_at_their_rate_and_only_while_the_failure_lasts():
+    usb = line(failures=[Failure("lost_bytes", S, 2 * S, {"probability_per_byte": 0.2})])
     for start_ns in (0, S, 2 * S):
         usb.send(start_ns, bytes(5000))
     per_second = [0, 0, 0]
@@ -95,7 +95,7 @@ def test_bytes_get_lost_at_their_rate_and_only_while_the_fault_lasts():
 
 
 def test_half_frames_break_off():
-    usb = line(faults=[Fault("half_frames", 0, None, {"probability_per_frame": 1.0})])
+    usb = line(failures=[Failure("half_frames", 0, None, {"probability_per_frame": 1.0})])
     for index in range(100):
         usb.send(index * 50 * MS, bytes(21))
     lengths = [len(chunk) for _, chunk in usb.take(100 * S)]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from firmware_emulator.devices.star_camera import StarCamera
-from firmware_emulator.faults import Fault, Faults
+from firmware_emulator.failures import Failure, Failures
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.body import Body
 from firmware_emulator.plant.motion_state import Motion, PollGrid
@@ -22,12 +22,12 @@ def gliding_vehicle():
     )
 
 
-def expose(seconds, faults=(), **changes):
+def expose(seconds, failures=(), **changes):
     settings = {
         "rate_hz": 10.0, "exposure_s": 0.02, "readout_s": 0.01, "delay_s": 0.08, "delay_jitter_s": 0.0,
     } | changes  # fmt: skip
     rng = np.random.default_rng(1)
-    camera = StarCamera(gliding_vehicle(), **settings, faults=Faults(faults), rng=rng, start_ns=0)
+    camera = StarCamera(gliding_vehicle(), **settings, failures=Failures(failures), rng=rng, start_ns=0)
     while camera.next_ns <= seconds * S:
         camera.run(camera.next_ns)
     return [exposure for _, exposure in camera.take(1000 * S)]
@@ -50,15 +50,15 @@ def test_pictures_never_overtake_each_other_and_scatter_as_stated():
 
 
 def test_a_frozen_camera_repeats_one_pose_and_a_silent_one_counts_on():
-    frozen = expose(2, [Fault("frozen_camera", S, None, {})])
+    frozen = expose(2, [Failure("frozen_camera", S, None, {})])
     assert len({exposure.start for exposure in frozen[-5:]}) == 1
     assert len({exposure.sequence for exposure in frozen}) == len(frozen)
-    silent = expose(2, [Fault("silent_camera", S // 2, S, {})])
+    silent = expose(2, [Failure("silent_camera", S // 2, S, {})])
     gaps = np.diff([exposure.sequence for exposure in silent])
     assert sorted(set(gaps)) == [1, 6]
 
 
-def test_sky_faults_are_marked_for_whoever_draws():
-    marked = expose(2, [Fault("dead_sky", S, None, {}), Fault("false_lights", 0, S, {"count": 7.0})])
+def test_sky_failures_are_marked_for_whoever_draws():
+    marked = expose(2, [Failure("dead_sky", S, None, {}), Failure("false_lights", 0, S, {"count": 7.0})])
     assert [e.is_sky_dead for e in marked] == [e.middle_ns >= S for e in marked]
     assert {e.false_lights for e in marked if e.middle_ns < S} == {7}

@@ -5,9 +5,9 @@ import struct
 import numpy as np
 import pytest
 
+from groundstation.bus.cdr import Codec, CodecError, ros_fields
 from groundstation.parts.stars.messages import StarSpots
 from groundstation.parts.valves.messages import CanIn
-from groundstation.bus.cdr import Codec, CodecError, ros_fields
 
 
 def test_a_message_laid_out_by_hand():

@@ -120,10 +120,10 @@ def test_a_board_on_the_table_tells_where_the_camera_hangs(folder, capsys):
 @pytest.mark.parametrize(
     ("places", "sentence"),
     [
-        ("frame,x_m,y_m\na,0,0\n", "line 2, column 'heading_deg' is missing"),
-        ("frame,x_m,y_m,heading_deg\nz,0,0,0\n", "line 2, there is no picture 'z'"),
+        ("frame,x_m,y_m\na,0,0\n", "line 1, column 'heading_deg' is missing"),
+        ("frame,x_m,y_m,heading_deg\nz,0,0,0\n", "line 2, frame: there is no picture 'z'"),
         ("frame,x_m,y_m,heading_deg\na,0,?,0\n", "line 2, y_m is '?', expected a number"),
-        ("frame,x_m,y_m,heading_deg\n", "names no picture"),
+        ("frame,x_m,y_m,heading_deg\n", "places.csv: has a header but no rows"),
         ("frame,x_m,y_m,heading_deg\na,0,0,0\n", "no ChArUco board of 6x4 squares is found"),
     ],
 )

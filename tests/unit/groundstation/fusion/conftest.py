@@ -1,48 +1,9 @@
-"""Data with truth for the fusion tests, made by the laboratory in tools/fusion_truth.py."""
-
-import importlib
-import sys
-from functools import cache
-from pathlib import Path
-from types import ModuleType
+"""A noise model and a covariance for the fusion tests."""
 
 import numpy as np
 import pytest
 
 from groundstation.fusion.noise import NoiseModel, packet_density
-
-ROOT = Path(__file__).parents[4]
-
-
-@cache
-def _laboratory() -> ModuleType:
-    tools = str(ROOT / "tools")
-    sys.path.insert(0, tools)  # its parts import each other by name
-    try:
-        return importlib.import_module("fusion_truth")
-    finally:
-        sys.path.remove(tools)
-
-
-@pytest.fixture(scope="session")
-def fusion_truth() -> ModuleType:
-    return _laboratory()
-
-
-@pytest.fixture(scope="session")
-def make_folder(tmp_path_factory):
-    """Write a data set once per settings and return its folder."""
-    made = {}
-
-    def make(**settings) -> Path:
-        key = tuple(sorted(settings.items()))
-        if key not in made:
-            laboratory = _laboratory()
-            made[key] = tmp_path_factory.mktemp("fusion")
-            laboratory.write(laboratory.make(laboratory.Laboratory(**settings)), made[key])
-        return made[key]
-
-    return make
 
 
 @pytest.fixture

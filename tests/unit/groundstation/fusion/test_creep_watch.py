@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.creep_watch import CreepWatch
 from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.flight_data import estimate
 
 
 def test_honest_innovations_hardly_ever_raise_it():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from oracles.flight import fly, moving_noise, transition
 
 from groundstation.fusion import error_state as es
-from groundstation.fusion.flight import fly, moving_noise, transition
 from groundstation.fusion.packet_history import Segment
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.registry import ESTIMATORS
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
 from groundstation.cli.fusion import app
+from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def run(*arguments: object):
 
 def refusal(*arguments: object) -> str:
     result = run(*arguments)
-    assert isinstance(result.exception, UsageError), result.output
+    assert isinstance(result.exception, UsageError | FileError), result.output
     return str(result.exception)
 
 
@@ -68,14 +69,14 @@ def test_columns_may_stand_in_any_order(folder, tmp_path):
 @pytest.mark.parametrize("name", ["imu.csv", "stars.csv", "meta.json"])
 def test_a_missing_file_is_named(folder, tmp_path, name):
     (folder / name).unlink()
-    assert f"{name} is missing" in refusal(folder, "--out", tmp_path / "e.csv")
+    assert f"{name}: cannot be read" in refusal(folder, "--out", tmp_path / "e.csv")
     assert not (tmp_path / "e.csv").exists()
 
 
 def test_a_missing_column_is_named(folder, tmp_path):
     text = (folder / "imu.csv").read_text().replace("ay_m_s2", "ay")
     (folder / "imu.csv").write_text(text)
-    assert "column ay_m_s2 is missing" in refusal(folder, "--out", tmp_path / "e.csv")
+    assert "line 1, column 'ay_m_s2' is missing" in refusal(folder, "--out", tmp_path / "e.csv")
 
 
 def test_a_word_among_numbers_is_named_with_its_line(folder, tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.estimator import Fix
+from groundstation.fusion.late_fix import LateFix
 from groundstation.fusion.packet_history import Segment
 
 
@@ -84,7 +85,7 @@ def test_reported_variances_follow_the_covariance_over_seconds(noise, x):
     rng = np.random.default_rng(0)
     A = rng.normal(0.0, 1.0, (es.SIZE, es.SIZE)) * 1e-4
     P = A @ A.T
-    poly = measurements.variance_in_time(x, P, noise)
+    poly = LateFix(noise).variance_in_time(x, P, noise)
     H = measurements.reported(x, 0.0)
     assert poly[0] == pytest.approx((H @ P @ H.T)[0, 0])
     assert poly[10] == pytest.approx(P[0, 0])
@@ -94,7 +95,7 @@ def test_a_turning_vehicles_heading_grows_uncertain_by_the_gyros_scale_too(noise
     rng = np.random.default_rng(8)
     A = 1e-3 * rng.normal(size=(es.SIZE, es.SIZE))
     P, w, tau = A @ A.T, 0.7, 0.8
-    poly = measurements.variance_in_time(x, P, noise)
+    poly = LateFix(noise).variance_in_time(x, P, noise)
     measurements.add_scale_in_time(poly, P, w)
     grown = np.zeros(es.SIZE)  # the heading's error after tau, from the error states
     grown[[es.THETA, es.GYRO_BIAS, es.GYRO_SCALE]] = 1.0, -tau, -w * tau

@@ -1,8 +1,7 @@
 import math
 
 import pytest
-
-from groundstation.fusion.packet_screen import PacketScreen
+from oracles.packet_screen import PacketScreen
 
 
 @pytest.mark.parametrize("wild", [(5.0, 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.0, -1.3), (math.nan, 0.0, 0.0)])

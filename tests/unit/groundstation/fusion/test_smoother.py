@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion import error_state as es
+from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.trace import Carried, Chain, Corrected
 from groundstation.fusion.walk_back import smooth_chain

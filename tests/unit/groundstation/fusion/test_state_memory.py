@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from groundstation.parts.fusion.messages import VehicleState
 from groundstation.fusion.state_memory import REACH_NS, StateMemory
+from groundstation.parts.fusion.messages import VehicleState
 
 PERIOD_NS = 10_000_000
 

@@ -4,12 +4,10 @@ import tomllib
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.calibrate import app
-from groundstation.cli.fusion import estimate
-from groundstation.cli.fusion_folder import read_folder
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.slope_grid import SlopeGrid, noise_with
 
 
@@ -50,10 +48,10 @@ def test_a_true_map_cuts_the_error_of_a_flight(fusion_truth, make_folder):
     assert error["with"] < 0.7 * error["without"]
 
 
-def test_constants_from_a_spin_lie_within_their_sigmas(make_folder, tmp_path):
+def test_constants_from_a_spin_lie_within_their_sigmas(make_folder, tmp_path, groundstation):
     folder = make_folder(scenario="spin", seed=64, duration_s=60.0)
-    result = CliRunner().invoke(
-        app, ["joint", str(folder), "--out", str(tmp_path / "j.toml"), "--plot", str(tmp_path / "j.png")]
+    result = groundstation(
+        "calibrate", "joint", folder, "--out", tmp_path / "j.toml", "--plot", tmp_path / "j.png"
     )
     assert result.exit_code == 0, result.output
     found = tomllib.loads((tmp_path / "j.toml").read_text())

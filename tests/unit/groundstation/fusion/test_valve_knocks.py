@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles.flight import fly
+from oracles.valve_knocks import add_knocks
 
 from groundstation.fusion import error_state as es
-from groundstation.fusion.flight import fly
 from groundstation.fusion.packet_history import Segment
-from groundstation.fusion.valve_knocks import add_knocks
 
 
 def flown(period_s, force_m_s2, noise):

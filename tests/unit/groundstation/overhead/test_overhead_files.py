@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 
@@ -44,7 +44,7 @@ def test_a_level_camera_has_the_tables_x_to_its_right_and_looks_down():
 def test_a_wrong_camera_file_is_refused_by_its_key(tmp_path, change, sentence):
     path = tmp_path / "camera.json"
     path.write_text(json.dumps({**CAMERA, **change}))
-    with pytest.raises(CalibrationFileError, match=sentence) as caught:
+    with pytest.raises(FileError, match=sentence) as caught:
         OverheadCamera.load(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
@@ -62,7 +62,7 @@ def test_what_is_no_camera_file_is_refused(tmp_path, text):
     path = tmp_path / "camera.json"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(CalibrationFileError):
+    with pytest.raises(FileError):
         OverheadCamera.load(path)
 
 
@@ -92,7 +92,7 @@ def test_wrong_circles_are_refused_by_their_key(tmp_path, old, new, sentence):
     if sentence is None:
         assert len(load_liveries(path)) == 2
         return
-    with pytest.raises(CalibrationFileError, match=sentence):
+    with pytest.raises(FileError, match=sentence):
         load_liveries(path)
 
 
@@ -100,5 +100,5 @@ def test_mock_ups_that_look_the_same_from_above_are_refused(tmp_path):
     path = tmp_path / "circles.toml"
     alpha = CIRCLES[CIRCLES.index("[alpha]") : CIRCLES.index("[beta]")]
     path.write_text(alpha + alpha.replace("[alpha]", "[gamma]").replace("0.11", "0.115"))
-    with pytest.raises(CalibrationFileError, match="'alpha' and 'gamma' look the same from above"):
+    with pytest.raises(FileError, match="'alpha' and 'gamma' look the same from above"):
         load_liveries(path)

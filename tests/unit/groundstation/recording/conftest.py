@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from groundstation.bus.cdr import ros_fields
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.declarations.topic import Scope
 from groundstation.bus.journal import Journal
+from groundstation.declarations.topic import Scope
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.parts.valves.messages import CanIn
-from groundstation.bus.cdr import ros_fields
 
 PERIOD_NS = 10_000_000
 
@@ -34,7 +33,7 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     counts: dict = {}
     flight = []
 
-    def say(payload, publish_ns):
+    def publish(payload, publish_ns):
         key = (type(payload), payload.vehicle)
         counts[key] = counts.get(key, 0) + 1
         flight.append(Delivered(envelope_of(payload, counts[key], "flight", publish_ns), payload))
@@ -42,15 +41,15 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     for step in range(steps):
         now_ns = (step + 1) * PERIOD_NS
         for vehicle in ("alpha", "bravo"):
-            say(ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
+            publish(ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
             force = tuple(random.normal(size=2).tolist())
-            say(Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
-        say(CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
+            publish(Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
+        publish(CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
         if step % 7 == 0:
-            say(StarImage(now_ns, "alpha", 8, 8, "mono8", 0, 8, random.bytes(64)), now_ns)
-            say(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
+            publish(StarImage(now_ns, "alpha", now_ns - 1, 8, 8, "mono8", 8, random.bytes(64)), now_ns)
+            publish(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
         if step % 10 == 9:
-            say(Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
+            publish(Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
     return flight
 
 

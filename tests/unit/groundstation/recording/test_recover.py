@@ -15,6 +15,10 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from groundstation.bus.cdr import codec_of
+from groundstation.bus.ros_schema import ENCODING, schema_text
+from groundstation.parts.imu.messages import ImuBytes
+from groundstation.parts.table import installed_tables
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
@@ -22,6 +26,7 @@ from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.recording.writer import Recorder
 
+EVERYTHING = installed_tables().payloads.values()
 INFO = RecordingInfo("name = 'two mock-ups'\n", images=ImagePolicy.LOSSLESS, seed=5)
 
 
@@ -38,7 +43,7 @@ def whole(tmp_path_factory, small_flight):
 def messages(path):
     with Recording(path) as recording:
         assert recording.info == INFO
-        return [(r.envelope, r.data, r.log_ns) for r in recording.messages()]
+        return [(r.envelope, r.data, r.log_ns) for r in recording.messages(EVERYTHING)]
 
 
 def readable(data: bytes) -> int:
@@ -97,7 +102,7 @@ def test_a_cut_in_the_head_is_refused_or_gives_an_empty_recording(tmp_path, whol
         else:
             assert recover(tmp_path / "x.part", target).messages == 0
             with Recording(target) as recording:
-                assert list(recording.messages()) == []
+                assert list(recording.messages(EVERYTHING)) == []
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
@@ -106,9 +111,10 @@ def test_the_torn_chunk_itself_gives_what_its_compressor_had_finished(tmp_path, 
     file = io.BytesIO()
     writer = Writer(file, chunk_size=1 << 30, compression=compression)
     writer.start(profile="ros2")
-    channel = writer.register_channel("/alpha/imu_bytes", "cdr", 0)
+    schema = writer.register_schema(ImuBytes.ROS_TYPE, ENCODING, schema_text(ImuBytes).encode())
+    channel = writer.register_channel("/alpha/imu_bytes", "cdr", schema)
     payload = small_flight(1)[0]
-    data = payload.envelope.topic.codec.encode(payload.payload)
+    data = codec_of(ImuBytes).encode(payload.payload)
     for number in range(8000):
         writer.add_message(channel, number, data + number.to_bytes(3, "little"), number, number)
     writer.finish()
@@ -117,7 +123,7 @@ def test_the_torn_chunk_itself_gives_what_its_compressor_had_finished(tmp_path, 
     report, target = recovered(tmp_path, cut)
     assert 4000 < report.messages < 8000
     with Recording(target) as recording:
-        assert [r.envelope.sequence for r in recording.messages()] == list(range(report.messages))
+        assert [r.envelope.sequence for r in recording.messages(EVERYTHING)] == list(range(report.messages))
 
 
 def test_a_file_without_chunks_is_recovered_too(tmp_path, small_flight):
@@ -201,6 +207,6 @@ def test_a_torn_or_garbled_file_is_read_or_refused_in_one_sentence(tmp_path, who
             del data[cut:]
         path.write_bytes(data)
         with contextlib.suppress(RecordingError), Recording(path) as recording:
-            list(recording.messages())
+            list(recording.messages(EVERYTHING))
 
     check()

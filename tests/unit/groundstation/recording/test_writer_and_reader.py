@@ -1,13 +1,20 @@
 """What is recorded comes back, in order and bit for bit; equal runs give equal files."""
 
 import itertools
+from collections import Counter
 
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
-from groundstation.bus.topics import TOPICS, topic_named, topic_of
+from groundstation.bus.cdr import codec_of
+from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.record_stream import RecordWriter, read_batch
+from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.parts.control.messages import Wrench
+from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.table import installed_tables
 from groundstation.recording.channels import channel_name, parse_channel
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
@@ -15,6 +22,8 @@ from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
 
+PAYLOADS = installed_tables().payloads
+KINDS = PAYLOADS.values()
 EVERYTHING = RecordingInfo(images=ImagePolicy.LOSSLESS)
 
 
@@ -26,19 +35,19 @@ def record(path, flight, info=EVERYTHING):
 
 
 def encoded(flight):
-    return [(d.envelope, d.envelope.topic.codec.encode(d.payload)) for d in flight]
+    return [(d.envelope, codec_of(type(d.payload)).encode(d.payload)) for d in flight]
 
 
 def test_what_was_recorded_comes_back_in_order_and_bit_for_bit(tmp_path, flight):
     with Recording(record(tmp_path / "a.mcap", flight)) as recording:
-        found = list(recording.messages())
+        found = list(recording.messages(KINDS))
     assert [(r.envelope, r.data) for r in found] == encoded(flight)
     assert [r.log_ns for r in found] == [d.envelope.publish_ns for d in flight]
 
 
 def test_payloads_come_back_decoded(tmp_path, flight):
     with Recording(record(tmp_path / "a.mcap", flight)) as recording:
-        found = list(recording.delivered())
+        found = list(recording.delivered(KINDS))
     assert encoded(found) == encoded(flight)
 
 
@@ -46,7 +55,7 @@ def test_bytes_from_the_bus_and_payloads_make_the_same_file(tmp_path, flight):
     first = record(tmp_path / "a.mcap", flight)
     with Recorder(tmp_path / "b.mcap", RecordingInfo(images=ImagePolicy.LOSSLESS)) as recorder:
         for envelope, data in encoded(flight):
-            recorder.record_encoded(envelope, data, envelope.publish_ns)
+            recorder.record_encoded(PAYLOADS[envelope.topic.noun], envelope, data, envelope.publish_ns)
     assert first.read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
@@ -60,17 +69,16 @@ def test_two_equal_runs_give_equal_bytes(tmp_path, flight):
 
 def test_topics_and_owners_can_be_chosen(tmp_path, flight):
     with Recording(record(tmp_path / "a.mcap", flight)) as recording:
-        wrench = Wrench.TOPIC
-        found = list(recording.messages([wrench], ["bravo"]))
+        found = list(recording.messages([Wrench], ["bravo"]))
         assert [(r.envelope, r.data) for r in found] == [
-            item for item in encoded(flight) if item[0].topic is wrench and item[0].vehicle == "bravo"
+            item for item in encoded(flight) if item[0].topic is Wrench.TOPIC and item[0].owner == "bravo"
         ]
         assert list(recording.messages([], None)) == []
 
 
 def test_a_stretch_of_time_can_be_chosen(tmp_path, flight):
     with Recording(record(tmp_path / "a.mcap", flight)) as recording:
-        found = [r.log_ns for r in recording.messages(start_ns=300_000_000, stop_ns=700_000_000)]
+        found = [r.log_ns for r in recording.messages(KINDS, start_ns=300_000_000, stop_ns=700_000_000)]
     assert found == [
         d.envelope.publish_ns for d in flight if 300_000_000 <= d.envelope.publish_ns < 700_000_000
     ]
@@ -83,7 +91,7 @@ def test_messages_logged_late_come_in_the_order_of_their_log_times(tmp_path, fli
             late_ns = 400_000_000 if place % 5 == 0 else 0
             recorder.record(delivered, delivered.envelope.publish_ns + late_ns)
     with Recording(tmp_path / "a.mcap") as recording:
-        found = [r.log_ns for r in recording.messages()]
+        found = [r.log_ns for r in recording.messages(KINDS)]
     assert len(found) == len(flight)
     assert found == sorted(found)
 
@@ -93,7 +101,7 @@ def test_the_rig_decides_what_is_kept_of_the_cameras(tmp_path, flight):
     for policy in ImagePolicy:
         path = record(tmp_path / f"{policy}.mcap", flight, RecordingInfo(images=policy))
         with Recording(path) as recording:
-            kept[policy] = {channel.topic.noun for channel in recording.channels}
+            kept[policy] = {channel.noun for channel in recording.channels}
             assert recording.info.images is policy
     assert {"star_image", "star_spots"} <= kept[ImagePolicy.LOSSLESS]
     assert kept[ImagePolicy.LOSSLESS] - kept[ImagePolicy.SPOTS] == {"star_image"}
@@ -106,7 +114,7 @@ def test_provenance_comes_back(tmp_path):
     )
     with Recording(record(tmp_path / "a.mcap", [], info)) as recording:
         assert recording.info == info
-        assert list(recording.messages()) == []
+        assert list(recording.messages(KINDS)) == []
 
 
 def test_a_recording_in_virtual_time_names_no_date():
@@ -152,7 +160,7 @@ def test_an_exception_in_the_run_still_finishes_the_recording(tmp_path, flight):
     with pytest.raises(ZeroDivisionError):
         run()
     with Recording(tmp_path / "a.mcap") as recording:
-        assert len(list(recording.messages())) == 1
+        assert len(list(recording.messages(KINDS))) == 1
 
 
 def test_nothing_already_recorded_is_overwritten(tmp_path, flight):
@@ -194,7 +202,7 @@ def test_a_damaged_chunk_is_named_and_not_passed_over(tmp_path, flight):
     data[len(data) // 3] ^= 0x40
     path.write_bytes(data)
     with Recording(path) as recording, pytest.raises(RecordingError, match="recover"):
-        list(recording.messages())
+        list(recording.messages(KINDS))
 
 
 def test_a_viewer_reads_the_file(tmp_path, flight):
@@ -208,12 +216,77 @@ def test_a_viewer_reads_the_file(tmp_path, flight):
     assert {f.schema.name for f in found} == {"geometry_msgs/msg/WrenchStamped"}
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.noun)
-def test_channel_names_are_read_back(topic):
-    owner = "" if topic.scope.name == "RIG" else "alpha"
-    assert parse_channel(channel_name(topic, owner)) == (topic, owner)
+@pytest.mark.parametrize("noun", PAYLOADS)
+def test_channel_names_are_read_back(noun):
+    owner = "" if PAYLOADS[noun].TOPIC.scope.name == "RIG" else "alpha"
+    assert parse_channel(channel_name(noun, owner)) == (noun, owner)
 
 
-def test_channels_of_others_are_left_alone():
-    assert parse_channel("/tf") is None
-    assert parse_channel("/alpha/state") == (topic_named("state"), "alpha")
+def test_channels_of_others_are_left_alone(tmp_path, flight):
+    """Another recorder's channels are listed with what they hold, and nothing of them is read as ours."""
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        tf = writer.register_schema(
+            "tf2_msgs/msg/TFMessage", "ros2msg", b"geometry_msgs/TransformStamped[] t\n"
+        )
+        wrench = writer.register_schema(Wrench.ROS_TYPE, ENCODING, schema_text(Wrench).encode())
+        ours = next(d.payload for d in flight if isinstance(d.payload, Wrench))
+        writer.add_message(writer.register_channel("/tf", "cdr", tf), 1, bytes(20), 1, 1)
+        writer.add_message(writer.register_channel("/notes", "json", 0), 2, b"{}", 2, 1)
+        channel = writer.register_channel("/alpha/wrench", "cdr", wrench)
+        writer.add_message(channel, 3, codec_of(Wrench).encode(ours), 3, 1)
+        writer.add_metadata("groundstation", RecordingInfo().to_metadata())
+        writer.finish()
+    with Recording(path) as recording:
+        assert [(c.noun, c.owner, c.count) for c in recording.channels] == [
+            ("tf", "", 1),
+            ("wrench", "alpha", 1),
+        ]
+        assert [message.envelope.topic.noun for message in recording.messages(KINDS)] == ["wrench"]
+
+
+def test_channels_are_sorted_by_noun_and_owner_and_say_what_they_hold(tmp_path, flight):
+    with Recording(record(tmp_path / "a.mcap", flight)) as recording:
+        names = [(channel.noun, channel.owner) for channel in recording.channels]
+        assert names == sorted(names)
+        published = Counter((d.envelope.topic.noun, d.envelope.owner) for d in flight)
+        assert {
+            name: channel.count for name, channel in zip(names, recording.channels, strict=True)
+        } == published
+        assert recording.has(Wrench, "bravo")
+        assert not recording.has(Wrench, "charlie")
+
+
+def test_the_record_stream_and_payloads_make_the_same_file(tmp_path, flight):
+    first = record(tmp_path / "a.mcap", flight)
+    with Recorder(tmp_path / "b.mcap", EVERYTHING) as recorder:
+        for start in range(0, len(flight), 20):
+            assert recorder.record_batch(batch_of(flight[start : start + 20]), PAYLOADS) == 0
+    assert first.read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def batch_of(messages):
+    writer = RecordWriter()
+    for envelope, data in encoded(messages):
+        writer.add(envelope, data)
+    return read_batch(writer.take())
+
+
+def test_a_latched_message_that_a_batch_repeats_is_written_once(tmp_path):
+    phase = SequencePhase(5, "alpha", "resting", "")
+    published = [Delivered(Envelope(SequencePhase.TOPIC, "alpha", number, 5), phase) for number in (1, 2)]
+    with Recorder(tmp_path / "a.mcap", EVERYTHING) as recorder:
+        for message in (published[0], published[0], published[1], published[1]):
+            assert recorder.record_batch(batch_of([message]), PAYLOADS) == 0
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert [found.envelope.sequence for found in recording.messages([SequencePhase])] == [1, 2]
+
+
+def test_messages_of_unknown_topics_in_a_batch_are_counted_and_not_written(tmp_path, flight):
+    known = {noun: kind for noun, kind in PAYLOADS.items() if kind is not Wrench}
+    wrenches = sum(isinstance(d.payload, Wrench) for d in flight)
+    with Recorder(tmp_path / "a.mcap", EVERYTHING) as recorder:
+        assert recorder.record_batch(batch_of(flight), known) == wrenches > 0
+        assert recorder.message_count == len(flight) - wrenches

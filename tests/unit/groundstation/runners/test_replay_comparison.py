@@ -4,12 +4,16 @@ import math
 
 import pytest
 
-from groundstation.bus.topics import topic_of
-from groundstation.parts.control.messages import ControlStatus
+from groundstation.bus.cdr import codec_of
+from groundstation.bus.envelope import Envelope
 from groundstation.declarations.errors import UsageError
+from groundstation.parts.control.messages import ControlStatus
+from groundstation.parts.table import installed_tables
+from groundstation.recording.reader import Recorded
 from groundstation.runners.replay_comparison import difference, load_tolerances
 
-TOPIC = ControlStatus.TOPIC
+CODEC = codec_of(ControlStatus)
+PAYLOADS = installed_tables().payloads
 
 
 def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
@@ -17,7 +21,9 @@ def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
 
 
 def compare(then, now, **allowed):
-    return difference(TOPIC, 3, TOPIC.codec.encode(then), now, {"control_status": allowed})
+    envelope = Envelope(ControlStatus.TOPIC, "alpha", 3, 5)
+    recorded = Recorded(envelope, CODEC.encode(then), 5, CODEC.decode)
+    return difference(recorded, now, {"control_status": allowed})
 
 
 def test_equal_bits_need_no_tolerance():
@@ -51,7 +57,7 @@ def test_texts_and_integers_have_no_tolerance():
 def test_tolerances_are_read_from_toml(tmp_path):
     path = tmp_path / "t.toml"
     path.write_text("[wrench]\nforce_x_n = 1e-9\n[fix_account]\nnis = 1\n")
-    assert load_tolerances(path) == {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
+    assert load_tolerances(path, PAYLOADS) == {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
 
 
 @pytest.mark.parametrize(
@@ -71,9 +77,9 @@ def test_wrong_tolerances_are_refused_in_one_sentence(tmp_path, text, sentence):
     path = tmp_path / "t.toml"
     path.write_text(text)
     with pytest.raises(UsageError, match=sentence):
-        load_tolerances(path)
+        load_tolerances(path, PAYLOADS)
 
 
 def test_tolerances_that_are_not_there_are_refused(tmp_path):
     with pytest.raises(UsageError, match="cannot be read"):
-        load_tolerances(tmp_path / "nothing.toml")
+        load_tolerances(tmp_path / "nothing.toml", PAYLOADS)

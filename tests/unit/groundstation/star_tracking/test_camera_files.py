@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
@@ -39,7 +39,7 @@ def test_a_camera_survives_the_way_to_its_file_and_back(tmp_path):
 @pytest.mark.parametrize("key", sorted(GOOD))
 def test_a_missing_key_is_named(tmp_path, key):
     data = {k: v for k, v in GOOD.items() if k != key}
-    with pytest.raises(CalibrationFileError, match=f"'{key}' is missing"):
+    with pytest.raises(FileError, match=f"'{key}' is missing"):
         CameraCalibration.load(write(tmp_path / "camera.json", data))
 
 
@@ -58,7 +58,7 @@ def test_a_missing_key_is_named(tmp_path, key):
     ],
 )
 def test_an_impossible_value_is_named_with_its_key(tmp_path, key, value):
-    with pytest.raises(CalibrationFileError, match=key):
+    with pytest.raises(FileError, match=key):
         CameraCalibration.load(write(tmp_path / "camera.json", {**GOOD, key: value}))
 
 
@@ -66,14 +66,14 @@ def test_an_impossible_value_is_named_with_its_key(tmp_path, key, value):
 def test_what_is_no_json_object_is_refused(tmp_path, text):
     path = tmp_path / "camera.json"
     path.write_text(text)
-    with pytest.raises(CalibrationFileError, match=r"camera\.json"):
+    with pytest.raises(FileError, match=r"camera\.json"):
         CameraCalibration.load(path)
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(CalibrationFileError, match="cannot be read"):
+    with pytest.raises(FileError, match="cannot be read"):
         CameraCalibration.load(tmp_path / "camera.json")
-    with pytest.raises(CalibrationFileError, match="cannot be read"):
+    with pytest.raises(FileError, match="cannot be read"):
         StarCatalogue.load(tmp_path / "ceiling.csv")
 
 
@@ -112,6 +112,6 @@ def test_a_surveyed_catalogue_brings_its_standard_deviations(tmp_path):
 def test_a_wrong_catalogue_is_refused_in_one_sentence(tmp_path, text, words):
     path = tmp_path / "ceiling.csv"
     path.write_text(text)
-    with pytest.raises(CalibrationFileError, match=words) as refusal:
+    with pytest.raises(FileError, match=words) as refusal:
         StarCatalogue.load(path)
     assert "\n" not in str(refusal.value)

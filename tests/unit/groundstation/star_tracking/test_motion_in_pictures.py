@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oracles.motion import Smear, smear_from_streaks, unbend
 
 from groundstation.star_tracking.detection import detect
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, Refusal, StarFix
-from groundstation.star_tracking.motion import Smear, smear_from_streaks, unbend
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 

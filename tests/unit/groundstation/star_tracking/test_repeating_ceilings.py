@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from oracles.search import oracle_tracker
 
-from groundstation.core.library import PURE, default_core
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import NoFix, PosePrior, Refusal, StarFix
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -26,10 +26,10 @@ def spots_of(painter, rng, stars_m, pose):
     return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
 
 
-@pytest.mark.parametrize("core", [default_core(), PURE], ids=["default", "pure"])
-def test_rows_and_columns_of_leds_are_refused_in_words(painter, camera, core):
+@pytest.mark.parametrize("make", [StarTracker, oracle_tracker])
+def test_rows_and_columns_of_leds_are_refused_in_words(painter, camera, make):
     rng, stars = np.random.default_rng(2), rows_and_columns(0.0)
-    tracker = StarTracker(StarCatalogue.from_positions(stars), camera, core=core)
+    tracker = make(StarCatalogue.from_positions(stars), camera)
     for _ in range(5):
         pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.5), rng.uniform(-np.pi, np.pi))
         spots = spots_of(painter, rng, stars, pose)
@@ -43,10 +43,10 @@ def test_rows_and_columns_of_leds_are_refused_in_words(painter, camera, core):
         assert isinstance(fix, StarFix)
 
 
-@pytest.mark.parametrize("core", [default_core(), PURE], ids=["default", "pure"])
-def test_leds_a_few_millimetres_out_of_line_tell_the_places_apart(painter, camera, core):
+@pytest.mark.parametrize("make", [StarTracker, oracle_tracker])
+def test_leds_a_few_millimetres_out_of_line_tell_the_places_apart(painter, camera, make):
     rng, stars = np.random.default_rng(3), rows_and_columns(0.005)
-    tracker = StarTracker(StarCatalogue.from_positions(stars), camera, core=core)
+    tracker = make(StarCatalogue.from_positions(stars), camera)
     for _ in range(10):
         pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.5), rng.uniform(-np.pi, np.pi))
         fix = tracker.solve(spots_of(painter, rng, stars, pose))

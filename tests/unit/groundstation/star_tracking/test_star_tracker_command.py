@@ -7,10 +7,10 @@ import tomllib
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.errors import UsageError
-from groundstation.cli.star_tracker import COLUMNS, app
+from groundstation.cli.star_tracker import COLUMNS
+from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
 
 POSES = ((2.0, 1.8, 0.5), (2.6, 2.1, -2.0))
 
@@ -30,11 +30,9 @@ def ceiling_folder(tmp_path_factory, painter):
     return folder
 
 
-def call(*arguments):
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result
+@pytest.fixture
+def call(groundstation):
+    return lambda *words: groundstation("star-tracker", *words)
 
 
 def copy_of(folder, tmp_path):
@@ -45,7 +43,7 @@ def copy_of(folder, tmp_path):
 
 
 @pytest.mark.parametrize("method", ["default", "published"])
-def test_every_frame_gets_its_row_with_the_columns_of_the_format(ceiling_folder, tmp_path, method):
+def test_every_frame_gets_its_row_with_the_columns_of_the_format(call, ceiling_folder, tmp_path, method):
     out = tmp_path / "answers.csv"
     call("solve", ceiling_folder, "--out", out, "--method", method)
     with out.open(newline="") as file:
@@ -61,7 +59,7 @@ def test_every_frame_gets_its_row_with_the_columns_of_the_format(ceiling_folder,
         assert np.hypot(float(row["x_m"]) - pose[0], float(row["y_m"]) - pose[1]) < reach
 
 
-def test_refused_frames_are_drawn_or_all_of_them(ceiling_folder, tmp_path):
+def test_refused_frames_are_drawn_or_all_of_them(call, ceiling_folder, tmp_path):
     for options, names in (((), ["00002"]), (("--every-picture",), ["00000", "00001", "00002"])):
         folder = tmp_path / f"drawn{len(options)}"
         call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--pictures", folder, *options)
@@ -69,7 +67,7 @@ def test_refused_frames_are_drawn_or_all_of_them(ceiling_folder, tmp_path):
         assert cv2.imread(str(folder / "00002.png")).shape[1] == 2 * 640
     with pytest.raises(UsageError, match="--pictures"):
         call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--every-picture")
-    with pytest.raises(UsageError, match="a file is in its place"):
+    with pytest.raises(FileError, match="a file is in its place"):
         call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--pictures", tmp_path / "a.csv")
 
 
@@ -84,28 +82,28 @@ def test_refused_frames_are_drawn_or_all_of_them(ceiling_folder, tmp_path):
         (lambda p: cv2.imwrite(str(p), np.zeros((480, 640), np.uint16)), "16-bit"),
     ],
 )
-def test_a_bad_picture_is_named_and_nothing_is_written(ceiling_folder, tmp_path, make, words):
+def test_a_bad_picture_is_named_and_nothing_is_written(call, ceiling_folder, tmp_path, make, words):
     folder = copy_of(ceiling_folder, tmp_path)
     make(folder / "frames" / "00001.png")
-    with pytest.raises(UsageError, match=words) as refusal:
+    with pytest.raises(FileError, match=words) as refusal:
         call("solve", folder, "--out", folder / "answers.csv", "--pictures", folder / "d", "--every-picture")
     assert "00001.png" in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert sorted(p.name for p in folder.iterdir()) == ["camera.json", "ceiling.csv", "frames"]
 
 
-def test_missing_folders_files_and_targets_are_named(ceiling_folder, tmp_path):
-    with pytest.raises(UsageError, match="no such folder"):
+def test_missing_folders_files_and_targets_are_named(call, ceiling_folder, tmp_path):
+    with pytest.raises(FileError, match="no such folder"):
         call("solve", tmp_path / "nowhere", "--out", tmp_path / "a.csv")
     folder = copy_of(ceiling_folder, tmp_path)
-    with pytest.raises(UsageError, match="cannot be written"):
+    with pytest.raises(FileError, match="cannot be written"):
         call("solve", folder, "--out", folder / "no" / "a.csv")
     (folder / "ceiling.csv").unlink()
-    with pytest.raises(UsageError, match=r"ceiling\.csv"):
+    with pytest.raises(FileError, match=r"ceiling\.csv"):
         call("solve", folder, "--out", folder / "a.csv")
 
 
-def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(ceiling_folder, tmp_path, painter):
+def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(call, ceiling_folder, tmp_path, painter):
     rng = np.random.default_rng(62)
     frames = tmp_path / "frames"
     frames.mkdir()
@@ -140,7 +138,7 @@ def test_a_sweep_becomes_a_catalogue_that_solves_the_ceiling(ceiling_folder, tmp
         assert [row["fix"] for row in csv.DictReader(file)] == ["1"] * 8
 
 
-def test_black_and_saturated_frames_are_answered_with_their_reasons(ceiling_folder, tmp_path):
+def test_black_and_saturated_frames_are_answered_with_their_reasons(call, ceiling_folder, tmp_path):
     folder = copy_of(ceiling_folder, tmp_path)
     cv2.imwrite(str(folder / "frames" / "00001.png"), np.full((480, 640), 255, np.uint8))
     call("solve", folder, "--out", folder / "answers.csv")
@@ -162,12 +160,12 @@ def test_black_and_saturated_frames_are_answered_with_their_reasons(ceiling_fold
 )
 @pytest.mark.parametrize("command", ["solve", "intrinsics", "mount"])
 def test_a_wrong_sky_is_refused_in_one_sentence_by_every_command(
-    ceiling_folder, tmp_path, command, file, edit, words
+    call, ceiling_folder, tmp_path, command, file, edit, words
 ):
     folder = copy_of(ceiling_folder, tmp_path)
     path = folder / file
     path.write_text(edit(path.read_text()))
-    with pytest.raises(UsageError, match=words) as refusal:
+    with pytest.raises(FileError, match=words) as refusal:
         call(command, folder, "--out", folder / "out.toml")
     assert "\n" not in str(refusal.value)
     assert not (folder / "out.toml").exists()
@@ -182,15 +180,15 @@ def test_a_wrong_sky_is_refused_in_one_sentence_by_every_command(
         ("id,x_m,y_m,frame,u,v\n0,1,east,00000,9,9\n", "y_m is 'east'"),
     ],
 )
-def test_wrong_anchors_are_refused_in_one_sentence(ceiling_folder, tmp_path, text, words):
+def test_wrong_anchors_are_refused_in_one_sentence(call, ceiling_folder, tmp_path, text, words):
     folder = copy_of(ceiling_folder, tmp_path)
     (folder / "anchors.csv").write_text(text)
-    with pytest.raises(UsageError, match=words):
+    with pytest.raises(FileError, match=words):
         call("survey", folder, "--out", folder / "sky.csv")
     assert not (folder / "sky.csv").exists()
 
 
-def test_the_lens_from_the_stars_is_written_with_its_provenance(ceiling_folder, tmp_path, painter):
+def test_the_lens_from_the_stars_is_written_with_its_provenance(call, ceiling_folder, tmp_path, painter):
     folder = copy_of(ceiling_folder, tmp_path)
     rng = np.random.default_rng(63)
     for number in range(3, 7):

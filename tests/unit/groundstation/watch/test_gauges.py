@@ -1,55 +1,94 @@
-"""What the live view says of fixes that there are not, and of the sky."""
+"""What the parts show of a vehicle: rows, the line of the log, events."""
 
 import math
 
 import pytest
 
-from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.topics import topic_of
-from groundstation.cli.vehicle_rows import LABELS, line_of, rows_of
+from groundstation.declarations.request import Ack
+from groundstation.declarations.view import Level
+from groundstation.parts.control.messages import ControlStatus
+from groundstation.parts.fusion.messages import FixAccount, FusionStatus, VehicleState
+from groundstation.parts.imu.messages import Imu
+from groundstation.parts.operation.messages import Diagnostics, SequencePhase
+from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars.messages import SkyChange, StarFix
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
 from groundstation.watch.monitor import Monitor
 
 SECOND_NS = 1_000_000_000
 
 
+class Watched:
+    """A monitor of one vehicle that is given payloads at seconds."""
+
+    def __init__(self, tables, message, delivered):
+        self.monitor = Monitor(tables, ("alpha",))
+        self._message, self._delivered = message, delivered
+        self.now_ns = 0
+
+    def give(self, kind, second, vehicle="alpha", **fields):
+        self.now_ns = round(second * SECOND_NS)
+        payload = self._message(kind, vehicle, self.now_ns, **fields)
+        self.monitor.take_delivered(self._delivered(payload), self.now_ns)
+
+    def cells(self):
+        vehicle = self.monitor.vehicles["alpha"]
+        return dict(zip(vehicle.labels(), vehicle.rows(self.now_ns), strict=True))
+
+    def row(self, label):
+        return self.cells()[label].text
+
+    def line(self):
+        return self.monitor.vehicles["alpha"].line(self.now_ns)
+
+    def look(self, second):
+        self.monitor.take_lines()
+        self.now_ns = round(second * SECOND_NS)
+        self.monitor.look(self.now_ns)
+        return self.monitor.take_lines()
+
+
 @pytest.fixture
-def monitor():
-    return Monitor(("alpha",))
+def watched(tables, message, delivered):
+    return Watched(tables, message, delivered)
 
 
-def tell(monitor, payload):
-    topic = payload.TOPIC
-    monitor.take(Delivered(Envelope(topic, "alpha", 1, payload.stamp_ns), payload), payload.stamp_ns)
+def fix(watched, second, reason=""):
+    watched.give(StarFix, second, fix=not reason, reason=reason)
 
 
-def fix(second, reason=""):
-    pose = (math.nan,) * 3 if reason else (1.0, 2.0, 0.5)
-    return StarFix(second * SECOND_NS, "alpha", not reason, *pose, (0.0,) * 9, 0.0, 9, "tracking", reason)
+def test_the_rows_stand_in_their_order(watched):
+    assert watched.monitor.vehicles["alpha"].labels() == (
+        "phase",
+        "valves",
+        "commanded by",
+        "position, heading",
+        "off its goal",
+        "  rms of 30 s, by truth",
+        "estimate, rms by truth",
+        "IMU",
+        "star fixes",
+        "  innovation, NIS",
+        "  refused",
+        "  not used",
+        "tank",
+    )
+    assert {cell.text for cell in watched.cells().values()} == {"-"}
 
 
-def refused(monitor, second):
-    vehicle = monitor.vehicles["alpha"]
-    cell = rows_of(vehicle, second * SECOND_NS)[LABELS.index("  refused")].plain
-    return cell, line_of(vehicle, second * SECOND_NS)
+def test_the_present_reason_is_named_and_each_kind_is_counted(watched):
+    reasons = ["", "too few stars: 3 spots", "no light spots: none", "too few stars: 2 spots"]
+    for second, reason in enumerate(reasons, start=1):
+        fix(watched, second, reason)
+    assert watched.row("  refused") == "now: too few stars; 2 x too few stars, 1 x no light spots"
+    assert watched.line().endswith("no fix: too few stars (2 x)")
 
 
-def test_the_present_reason_is_named_and_each_kind_is_counted(monitor):
-    for second, reason in enumerate(
-        ["", "too few stars: 3 spots", "no light spots: none", "too few stars: 2 spots"], start=1
-    ):
-        tell(monitor, fix(second, reason))
-    cell, line = refused(monitor, 4)
-    assert cell == "now: too few stars; 2 x too few stars, 1 x no light spots"
-    assert line.endswith("no fix: too few stars (2 x)")
-
-
-def test_with_a_fix_again_only_the_counts_remain(monitor):
-    tell(monitor, fix(1, "too blurred: 9 spots"))
-    tell(monitor, fix(2))
-    cell, line = refused(monitor, 2)
-    assert cell == "1 x too blurred"
-    assert "no fix" not in line
+def test_with_a_fix_again_only_the_counts_remain(watched):
+    fix(watched, 1, "too blurred: 9 spots")
+    fix(watched, 2)
+    assert watched.row("  refused") == "1 x too blurred"
+    assert "no fix" not in watched.line()
 
 
 @pytest.mark.parametrize(
@@ -60,14 +99,112 @@ def test_with_a_fix_again_only_the_counts_remain(monitor):
         ("appeared", "", "a light that is no star appeared at (1.000, 2.000) m, proposed"),
     ],
 )
-def test_changes_of_the_sky_are_said_with_what_follows(monitor, change, star, words):
-    tell(monitor, SkyChange(SECOND_NS, "alpha", change, star, 1.0, 2.0, (1e-8, 0.0, 1e-8), 25))
-    (line,) = monitor.take_lines()
+def test_changes_of_the_sky_are_reported_with_what_follows(watched, change, star, words):
+    watched.give(SkyChange, 1, change=change, star=star, x_m=1.0, y_m=2.0)
+    (line,) = watched.monitor.take_lines()
     assert words in line
 
 
-def test_what_is_not_known_yet_is_a_dash(monitor):
-    line = line_of(monitor.vehicles["alpha"], 0)
+def test_what_is_not_known_yet_is_a_dash(watched):
+    line = watched.line()
     assert "nan" not in line
     assert "inf" not in line
     assert "age    - s" in line
+
+
+def test_the_line_of_a_log_has_fixed_columns(watched):
+    before = watched.line()
+    watched.give(SequencePhase, 1, phase="flying", detail="goal reached")
+    watched.give(ValveCommand, 1, gate="open")
+    watched.give(VehicleState, 1, position_table_m=(1.25, -0.5), heading_rad=math.pi / 2, status="flying")
+    watched.give(ControlStatus, 1, goal_position_table_m=(1.25, -0.496), goal_heading_rad=math.pi / 2)
+    watched.give(ReferenceState, 1, position_table_m=(1.251, -0.5), heading_rad=math.pi / 2)
+    watched.give(Imu, 1, frames_lost=2, valid=True)
+    watched.give(FusionStatus, 1, fixes_used=5, fixes_refused=1, fix_age_s=0.125)
+    fix(watched, 1)
+    assert watched.line() == (
+        "flying            open        1250.0   -500.0 mm   90.00 deg  off    4.0 mm   0.00 deg  "
+        "est  1.00 mm 0.000 deg  imu   0/s lost 2  fix  0.3/s age 0.12 s used 5 refused 1"
+    )
+    first = "position, heading"
+    assert before.index(" mm ") == watched.line().index(" mm "), first
+
+
+def test_levels_say_what_is_bad(watched):
+    watched.give(SequencePhase, 1, phase="stopped")
+    watched.give(VehicleMode, 1, armed=True)
+    watched.give(ValveCommand, 1, gate="stopped")
+    watched.give(ValveStatus, 1, open_mask=0b101, dead_man=True, pressure_pa=3e7)
+    watched.give(ValveSelection, 1, source="brake", reason="no command")
+    watched.give(VehicleState, 1, status="lost")
+    watched.give(Imu, 1, reason="frozen", frames_lost=3)
+    cells = watched.cells()
+    assert cells["phase"].pieces == (("stopped", Level.BAD),)
+    assert cells["valves"].pieces == (
+        ("armed, stopped ", Level.WARNING),
+        ("●·●·····", Level.PLAIN),
+        (" dead man", Level.BAD),
+    )
+    assert cells["commanded by"].pieces == (("brake: no command", Level.WARNING),)
+    assert cells["position, heading"].pieces[-1] == ("  LOST", Level.BAD)
+    assert cells["tank"].text == "300 bar, float air off"
+    assert cells["IMU"].pieces[1:] == (("  3 lost", Level.WARNING), ("  frozen", Level.BAD))
+
+
+def test_fixes_are_counted_by_what_became_of_them(watched):
+    for second, nis in enumerate((2.0, 4.0), start=1):
+        watched.give(FixAccount, second, used=True, nis=nis, innovation=(0.003, 0.004, 0.0))
+    for second in (3, 4):
+        watched.give(FixAccount, second, reason="outside the gate", nis=40.0, innovation=(0.03, 0.04, 0.0))
+    cells = watched.cells()
+    assert cells["  not used"].text == "2 x outside the gate"
+    assert cells["  innovation, NIS"].text == "   50.00 mm    0.000 deg  40.0, mean 3.0 of 3"
+    assert cells["  innovation, NIS"].pieces[0][1] is Level.BAD
+
+
+def test_station_keeping_is_measured_to_the_setpoint_while_flying(watched):
+    watched.give(ControlStatus, 1, goal_position_table_m=(1.0, 2.0), goal_heading_rad=3.1)
+    watched.give(ReferenceState, 1, position_table_m=(9.0, 9.0))  # not flying yet
+    watched.give(SequencePhase, 2, phase="flying")
+    watched.give(ReferenceState, 3, position_table_m=(1.003, 2.004), heading_rad=-3.1)
+    assert watched.row("  rms of 30 s, by truth") == "    5.00 mm    4.766 deg"
+    watched.give(ReferenceState, 40, position_table_m=(1.001, 2.0), heading_rad=3.1)  # the first is too old
+    assert watched.row("  rms of 30 s, by truth") == "    1.00 mm    0.000 deg"
+
+
+def test_the_estimate_is_carried_to_the_moment_of_the_truth(watched):
+    watched.give(VehicleState, 1, velocity_table_m_s=(0.1, 0.0), rate_rad_s=0.0, status="flying")
+    watched.give(ReferenceState, 1.01, position_table_m=(0.001, 0.002))
+    assert watched.row("estimate, rms by truth") == "    2.00 mm    0.000 deg"
+
+
+def test_phases_and_refused_requests_are_events(watched):
+    watched.give(SequencePhase, 1, phase="resting", detail="10 s")
+    watched.give(Ack, 2, action="arm", accepted=True)
+    watched.give(Ack, 3, action="go_to", accepted=False, reason="off the table")
+    assert watched.monitor.take_lines() == ["alpha: resting (10 s)", "alpha: go_to refused: off the table"]
+
+
+def test_a_silent_line_and_one_of_noise_are_reported_until_samples_come(watched):
+    watched.give(Diagnostics, 1, node="alpha/imu", level=0, summary="alpha/imu: open")
+    assert watched.look(3.9) == []
+    (line,) = watched.look(4.1)
+    assert line == "alpha/imu: open, but no byte comes: is the block switched on? Listening on"
+    assert watched.look(5) == []
+    watched.give(Imu, 6)
+    assert watched.look(6.1) == ["alpha/imu: samples come"]
+    for second, count in ((7, "10"), (8, "20")):
+        watched.give(Diagnostics, second, node="alpha/imu_reader", keys=("bytes_seen",), values=(count,))
+    (line,) = watched.look(10)
+    assert line.startswith("alpha/imu: noise and no frame")
+    watched.give(Diagnostics, 11, node="alpha/imu", level=2, summary="alpha/imu: gone")
+    assert watched.look(11.1) == []  # its port has reported that
+
+
+def test_a_silent_valve_node_is_reported_until_it_reports(watched):
+    watched.give(Diagnostics, 1, "", node="valve_bus", level=0, summary="valve_bus: open")
+    (line,) = watched.look(5)
+    assert line.startswith("alpha: nothing comes from its valve node")
+    assert watched.look(6) == []
+    watched.give(ValveStatus, 7)
+    assert watched.look(7.1) == ["alpha: its valve node reports"]

@@ -57,8 +57,9 @@ class Flight:
         wrench = self.publish(Wrench, wrench_ms, state, status, *others)
         demand = self.publish(ValveDemand, wrench_ms + 0.5, wrench)
         chosen = self.publish(ValveSelection, wrench_ms + 1, demand, newest_state, *others)
-        command = self.publish(ValveCommand, guard_ms, chosen, Cause("request", "operator", 1))
-        return self.publish(CanOut, bus_ms, command, Cause("can_in", "", 9))
+        for late_ms in (0, 20):  # the guard sends what is selected again and again
+            command = self.publish(ValveCommand, guard_ms + late_ms, chosen, Cause("request", "operator", 1))
+            self.publish(CanOut, bus_ms + late_ms, command, Cause("can_in", "", 9))
 
 
 @pytest.fixture
@@ -162,6 +163,8 @@ def test_what_no_state_triggered_has_no_age(message, delivered, cause):
     flight.publish(CanOut, 1021, stopped)
     flight.publish(CanOut, 1022, request, state)  # an order to float
     flight.publish(CanOut, 1023)
+    brake = flight.publish(ValveSelection, 1024, state)  # no demand came, no wrench did
+    flight.publish(CanOut, 1026, flight.publish(ValveCommand, 1025, brake))
     ledger = Ledger()
     for one in flight.messages:
         ledger.take_delivered(one)
@@ -173,6 +176,7 @@ def test_what_no_state_triggered_has_no_age(message, delivered, cause):
 
 def test_light_of_another_camera_counts_only_where_there_is_no_star_tracker(message, delivered, cause):
     flight = Flight(message, delivered, cause)
+    flight.command(1015, 1016, 1017, flight.state(1010, 0, 1009))  # no fix yet
     state = flight.state(1030, 1000, 1029)  # an overhead fix
     flight.command(1040, 1041, 1042, state)
     ledger = Ledger()

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.overhead.fix_referee import FixReferee
 from groundstation.parts.overhead.messages import OverheadFix
 from groundstation.parts.stars.messages import StarFix
-from groundstation.parts.overhead.fix_referee import FixReferee
 from groundstation.star_tracking.comparison import MIN_PAIRS
 
 MS = 1_000_000

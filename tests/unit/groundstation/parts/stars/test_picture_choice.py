@@ -5,7 +5,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.parts.stars.picture_choice import LONGEST_NS, PictureChoice, SOONEST_NS
+from groundstation.parts.stars.picture_choice import LONGEST_NS, SOONEST_NS, PictureChoice
 
 S = 1_000_000_000
 PERIOD_NS = S // 15

@@ -1,0 +1,54 @@
+"""A calibration's result delivered: files together or not at all, words to the terminal."""
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from calibration.outcome import CalibrationRefusedError, Outcome
+from calibration.result import Provenance
+from groundstation.declarations.errors import UsageError
+from groundstation.files.json_file import json_text
+from groundstation.files.png import png_of
+from groundstation.files.writing import Content, write_files
+
+
+@contextmanager
+def refusing(source: Path | str | None = None) -> Iterator[None]:
+    """Turn a refused calibration into a usage error, which names its source if the refusal does not."""
+    try:
+        yield
+    except CalibrationRefusedError as error:
+        raise UsageError(f"{error}." if source is None else f"{source}: {error}.") from error
+
+
+def deliver(
+    found: Outcome,
+    provenance: Provenance,
+    out: Path,
+    plot: Path | None = None,
+    camera_out: Path | None = None,
+    also: Mapping[Path, Content] | None = None,
+) -> None:
+    """Write a result with its provenance, the camera and the figure; print summary and warnings.
+
+    Args:
+        found: The result.
+        provenance: What it was made from.
+        out: TOML to write.
+        plot: PNG to write, if wanted.
+        camera_out: camera.json to write, if wanted.
+        also: Further files by name.
+
+    Raises:
+        FileError: A file cannot be written; then none is.
+    """
+    contents: dict[Path, Content] = {**(also or {}), out: found.to_toml(provenance)}
+    if camera_out is not None and found.camera is not None:
+        contents[camera_out] = json_text(found.camera.to_mapping())
+    if plot is not None and found.draw is not None:
+        contents[plot] = png_of(found.draw())
+    write_files(contents)
+    for warning in found.warnings:
+        sys.stderr.write(f"{provenance.recording}: {warning}.\n")
+    print(found.summary)

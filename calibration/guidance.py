@@ -1,0 +1,104 @@
+"""A guided calibration: what to do next, and when there is enough data.
+
+The sequence knows nothing of devices. It takes what a filter knows by now (sigmas) and what the vehicle does,
+and returns which step is due and what is missing. Steps are rows of a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """One number that must fall below (or, for amounts, rise above) a limit."""
+
+    quantity: str
+    limit: float
+    unit: str
+    is_amount: bool = False
+
+    def share(self, value: float) -> float:
+        """Return how far it is reached, 0 to 1; a sigma falls with the root of the data, so squared."""
+        if self.is_amount:
+            return max(0.0, min(1.0, value / self.limit))
+        return 1.0 if value <= self.limit else (self.limit / value) ** 2
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One row: an instruction and what ends it."""
+
+    name: str
+    instruction: str
+    is_rest: bool
+    goals: tuple[Goal, ...]
+    longest_s: float
+    """After this long it is given up, with what is known by then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What the operator is to do now."""
+
+    step: Step | None
+    """None when all is done."""
+    done: float
+    """Share of the step, 0 to 1."""
+    missing: str
+    """The goal that is furthest away, in words; empty when none is."""
+    is_new: bool
+    """Whether the step has just begun."""
+
+
+class GuidedSequence:
+    """Walks through the steps.
+
+    Args:
+        steps: the table.
+    """
+
+    def __init__(self, steps: tuple[Step, ...]) -> None:
+        self._steps = steps
+        self._number = -1
+        self._since_s = 0.0
+        self._base: Mapping[str, float] = MappingProxyType({})
+        self.outcomes: dict[str, str] = {}
+        """By step: "enough data", or what was missing when it was given up."""
+
+    def update(self, now_s: float, known: Mapping[str, float]) -> Advice:
+        """Judge what is known now.
+
+        Args:
+            now_s: any steady clock.
+            known: quantities of the goals by name; amounts count from the beginning of the run.
+        """
+        if self._number < 0:
+            return self._next(now_s, known)
+        if self._number >= len(self._steps):
+            return Advice(None, 1.0, "", is_new=False)
+        step = self._steps[self._number]
+        shares = {goal: goal.share(self._value(goal, known)) for goal in step.goals}
+        worst = min(shares, key=lambda goal: shares[goal])
+        if shares[worst] >= 1.0:
+            self.outcomes[step.name] = "enough data"
+            return self._next(now_s, known)
+        missing = f"{worst.quantity} {self._value(worst, known):.3g} of {worst.limit:.3g} {worst.unit}"
+        if now_s - self._since_s > step.longest_s:
+            self.outcomes[step.name] = f"given up after {step.longest_s:g} s: {missing}"
+            return self._next(now_s, known)
+        return Advice(step, shares[worst], missing, is_new=False)
+
+    def _value(self, goal: Goal, known: Mapping[str, float]) -> float:
+        value = known.get(goal.quantity, 0.0 if goal.is_amount else float("inf"))
+        return value - self._base.get(goal.quantity, 0.0) if goal.is_amount else value
+
+    def _next(self, now_s: float, known: Mapping[str, float]) -> Advice:
+        self._number += 1
+        self._since_s = now_s
+        self._base = MappingProxyType(dict(known))
+        if self._number >= len(self._steps):
+            return Advice(None, 1.0, "", is_new=True)
+        return Advice(self._steps[self._number], 0.0, "", is_new=True)

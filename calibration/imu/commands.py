@@ -1,0 +1,169 @@
+"""`groundstation calibrate` for the IMU, from recordings and data folders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from calibration.delivery import deliver, refusing
+from calibration.flights import read_flight
+from calibration.imu import joint as joint_procedure
+from calibration.imu import procedures
+from calibration.imu import tilt as tilt_procedure
+from calibration.outcome import Outcome
+from calibration.result import provenance_of, provenance_of_several
+from groundstation.declarations.errors import UsageError
+from groundstation.files.writing import check_targets
+from groundstation.fusion.flight_data import FlightData
+from groundstation.fusion.table_map import TableMap
+
+Source = Annotated[
+    Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, meta.json (and stars.csv).")
+]
+Out = Annotated[Path, typer.Option(help="TOML to write.")]
+Plot = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
+Vehicle = Annotated[str | None, typer.Option(help="Of a recording with several vehicles.")]
+
+
+def zero_offset(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
+    """Mean of the rest at the start, after a test that it was one.
+
+    Example: groundstation calibrate zero-offset samples/fusion/station --out rest.toml
+    """
+    _calibrate(source, vehicle, procedures.offsets_at_rest, out, plot, with_stars=False)
+
+
+def zero_offset_fit(
+    source: Source,
+    start_s: Annotated[float, typer.Option(help="Start of the stretch of flight.")],
+    end_s: Annotated[float, typer.Option(help="End of the stretch of flight.")],
+    out: Out,
+    plot: Plot = None,
+    vehicle: Vehicle = None,
+) -> None:
+    """Least squares for the accelerometers' constant offsets (mu, nu) over a stretch, as published.
+
+    Example: groundstation calibrate zero-offset-fit FOLDER --start-s 10 --end-s 30 --out fit.toml
+    """
+    if not end_s > start_s:
+        raise UsageError(f"--end-s must be after --start-s, found {start_s:g} and {end_s:g}.")
+    procedure = partial(procedures.offsets_of_stretch, start_s=start_s, end_s=end_s)
+    _calibrate(source, vehicle, procedure, out, plot)
+
+
+def temperature(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
+    """Temperature slopes of the gyro's null and the tilt offsets, from a long rest that warms up.
+
+    Example: groundstation calibrate temperature warm_up/ --out temperature.toml
+    """
+    _calibrate(source, vehicle, procedures.temperature_slopes, out, plot, with_stars=False)
+
+
+def gyro_scale(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
+    """Gyro scale by full turns against the stars.
+
+    Example: groundstation calibrate gyro-scale samples/fusion/spin --out scale.toml
+    """
+    _calibrate(source, vehicle, procedures.gyro_scale_by_turns, out, plot)
+
+
+def allan(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
+    """Allan deviation: white noise, bias instability, from a long rest.
+
+    Example: groundstation calibrate allan night_at_rest/ --out noise.toml --plot noise.png
+    """
+    _calibrate(source, vehicle, procedures.noise_at_rest, out, plot, with_stars=False)
+
+
+def tilt(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings (.mcap) or folders, rests inside.")],
+    out: Out,
+    tilts: Annotated[
+        Path | None,
+        typer.Option(help="CSV along_x_deg,along_y_deg: each axis above the horizontal, a row per rest."),
+    ] = None,
+    tilt_sigma_deg: Annotated[
+        float, typer.Option(help="How sure those are (gauge blocks, their base).")
+    ] = 0.01,
+    table_map: Annotated[Path | None, typer.Option(help="Map that says how the table pulls.")] = None,
+    least_s: Annotated[float, typer.Option(help="Shorter rests are left out.")] = 3.0,
+    plot: Plot = None,
+    vehicle: Vehicle = None,
+) -> None:
+    """Scale and axis misalignment of the accelerometers by tilting, or by turning on a tilted table.
+
+    Either set the landed vehicle on gauge blocks, tilted along x and along y, both ways, and write the tilts
+    down (--tilts). Or tilt the table by some mrad and land the vehicle at eight headings: the stars say them.
+    Then the common scale and turn of both axes stay unknown unless --table-map says how the table pulls.
+    Rests are found by themselves; knocks and touches in them are named and cut out.
+
+    Example: groundstation calibrate tilt level.mcap tilted.mcap --tilts tilts.csv --out tilt.toml
+    """
+    check_targets(out, plot)
+    if not least_s >= 1.0:
+        raise UsageError(f"--least-s must be 1 s or more, found {least_s:g}.")
+    if not tilt_sigma_deg > 0.0:
+        raise UsageError(f"--tilt-sigma-deg must be above zero, found {tilt_sigma_deg:g}.")
+    known = None if table_map is None else TableMap.load(table_map)
+    given = None if tilts is None else tilt_procedure.load_tilts(tilts)
+    rests = tilt_procedure.RestsFound()
+    for path in recordings:
+        data = read_flight(path, vehicle, with_stars=not (tilts is not None and path.is_dir()))
+        with refusing(path):
+            rests += tilt_procedure.rests_of(path.name, data, least_s, known)
+    with refusing(", ".join(path.name for path in recordings)):
+        found = tilt_procedure.axes_of(rests, given, math.radians(tilt_sigma_deg), known)
+    deliver(found, provenance_of_several(recordings), out, plot)
+
+
+def joint(
+    source: Annotated[
+        Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, stars.csv and meta.json.")
+    ],
+    out: Out,
+    plot: Plot = None,
+    table_map: Annotated[
+        Path | None, typer.Option(help="TOML to write the slope's map to, with its sigmas.")
+    ] = None,
+    vehicle: Vehicle = None,
+) -> None:
+    """Every constant of sensors, mounting, camera delay and slope from one recorded flight.
+
+    A quantity that the flight did not excite keeps a wide sigma: turn for scale and lever arm, push along
+    both axes for the accelerometers' scales, warm up for the temperature slopes. Turns give the lever arm of
+    the IMU. With --table-map the slope by place comes from the same flight, fitted together with its biases,
+    scales, lever arm and delay (`calibrate table-map` takes many flights and draws it).
+
+    Example: groundstation calibrate joint samples/fusion/spin --out joint.toml --plot residuals.png
+    """
+    from calibration.table.procedure import map_of_sources  # half of what is loaded, for one option
+    from calibration.table.smoothed_flights import read_source
+
+    check_targets(out, plot, table_map)
+    data = read_flight(source, vehicle)
+    with refusing(source):
+        made = None if table_map is None else map_of_sources([read_source(source, None, vehicle)])[1]
+        found = joint_procedure.constants_of_flight(data)
+    also = {} if made is None or table_map is None else made.files(table_map)
+    deliver(found, provenance_of(source), out, plot, also=also)
+
+
+def _calibrate(
+    source: Path,
+    vehicle: str | None,
+    procedure: Callable[[FlightData], Outcome],
+    out: Path,
+    plot: Path | None,
+    *,
+    with_stars: bool = True,
+) -> None:
+    check_targets(out, plot)
+    data = read_flight(source, vehicle, with_stars=with_stars)
+    with refusing(source):
+        found = procedure(data)
+    deliver(found, provenance_of(source), out, plot)

@@ -1,0 +1,70 @@
+"""Where the camera over the table hangs, by a board: board views in, an outcome out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.outcome import Outcome
+from calibration.overhead.figures import draw_board_pose
+from calibration.overhead.pose import POSE, BoardView, OverheadPose, calibrate_overhead_pose
+from calibration.result import Quantity
+from groundstation.overhead.overhead_camera import OverheadCamera
+
+
+def pose_by_board(
+    views: Sequence[BoardView],
+    lens: OverheadCamera,
+    tape_sigma_m: float,
+    tape_sigma_rad: float,
+    *,
+    thickness_m: float = 0.0,
+) -> Outcome:
+    """Find the pose of the camera from pictures of a board on the table.
+
+    Args:
+        views: Corners, and where the tape says that the board lay.
+        lens: The camera; its pose is a guess.
+        tape_sigma_m: How well places were measured.
+        tape_sigma_rad: How well headings were.
+        thickness_m: Of the board.
+
+    Raises:
+        CalibrationRefusedError: The pictures do not suffice.
+    """
+    pose = calibrate_overhead_pose(list(views), lens, tape_sigma_m, tape_sigma_rad, thickness_m)
+    camera = pose.camera
+    values = (*camera.position_table_m, camera.yaw_rad, camera.tilt_x_rad, camera.tilt_y_rad)
+    return Outcome(
+        title="Pose of the camera over the table, by a board",
+        summary=_sentence(pose, len(views)),
+        quantities={
+            name: Quantity(value, float(std), "m" if name.endswith("_m") else "rad")
+            for name, value, std in zip(POSE, values, pose.std, strict=True)
+        },
+        residual={
+            "corner_rms": Quantity(_rms(pose.residual_px), math.nan, "px"),
+            "tape_rms": Quantity(_rms(pose.tape_m), math.nan, "m"),
+            "tape_heading_rms": Quantity(_rms(pose.tape_rad), math.nan, "rad"),
+        },
+        notes={"pictures": len(views), "corners": len(pose.residual_px)},
+        draw=partial(draw_board_pose, pose.residual_px, pose.tape_m, pose.tape_rad),
+        camera=camera,
+    )
+
+
+def _sentence(pose: OverheadPose, pictures: int) -> str:
+    x, y, z = pose.camera.position_table_m
+    return (
+        f"the camera hangs at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {1e3 * max(pose.std[:3]):.1f} mm and "
+        f"{math.degrees(max(pose.std[3:])):.2f} deg; corners {_rms(pose.residual_px):.3f} px, "
+        f"tape against pictures {1e3 * _rms(pose.tape_m):.2f} mm over {pictures} places."
+    )
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt((np.asarray(values) ** 2).mean()))

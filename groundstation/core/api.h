@@ -1,0 +1,282 @@
+/* What Python and the core share: every structure and every function, declared here and nowhere else.
+ *
+ * The C files include this header; the build reads the same text with cffi (build.py), which drops the lines that begin
+ * with # and understands nothing but plain declarations: no macros, no inline functions. Arrays are the caller's.
+ */
+#ifndef GROUNDSTATION_API_H
+#define GROUNDSTATION_API_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#pragma GCC visibility push(default)
+
+/* Hash of the sources and flags that this library was made of. */
+const char *gs_sources(void);
+
+/* ---- Light spots of a picture: detect.c ------------------------------------------------------------------------- */
+
+/* What counts as a spot (star_tracking/detection.py). */
+typedef struct {
+    double threshold_sigmas;
+    double hot_pixel_ratio;
+    double gain_dn_per_electron;
+    int32_t saturation_dn;
+    int32_t max_spots;
+    int32_t max_lit; /* pixels */
+} DetectorSettings;
+
+/* What was found besides the spots. */
+typedef struct {
+    double background_dn, noise_dn;
+    int32_t hot_pixels, cut_by_edge;
+    int32_t is_flooded;
+} DetectionSummary;
+
+/* A symmetric 2x2 matrix. */
+typedef struct {
+    double uu, uv, vv;
+} Symmetric;
+
+/* One spot; Python reads it as nine doubles. */
+typedef struct {
+    double u_px, v_px, flux_dn;
+    Symmetric cov_px2;
+    double elongation;
+    double streak_u_px, streak_v_px;
+} FittedSpot;
+
+/* How much scratch memory gs_detect needs for pictures of this size. Only what a picture really needs is touched. */
+size_t gs_detect_scratch_bytes(int32_t rows, int32_t columns, const DetectorSettings *settings);
+
+/* Find the light spots of a grey picture of at least 32 x 32 pixels, rows `stride` bytes apart.
+ *
+ * `scratch` holds gs_detect_scratch_bytes and is 64-byte aligned; `fitted` has room for max_spots. Returns how many
+ * spots were found, brightest first. */
+int32_t gs_detect(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns,
+                  const DetectorSettings *settings, uint8_t *scratch, FittedSpot *fitted, DetectionSummary *summary);
+
+/* ---- Star identification and pose: star_*.c ----------------------------------------------------------------------
+ *
+ * All structures are filled by star_tracking/search.py, once per tracker but for the picture. Lengths are of the ceiling
+ * plane in m, angles in rad; q is a point of the ceiling in body axes, relative to the body's origin. */
+
+/* Points and turns of the ceiling plane: what NumPy holds as one complex128. */
+typedef struct {
+    double x, y;
+} Point;
+
+/* Pixel to ceiling (rays.CeilingRays). */
+typedef struct {
+    const double *table; /* (rows, columns, 6): q_x, q_y and dq_x/du, dq_x/dv, dq_y/du, dq_y/dv */
+    int64_t columns, rows;
+    double step_px, picture_rows, scale_m_px, reach_m;
+} Rays;
+
+/* The catalogue and its look-ups (sky_index.SkyIndex). */
+typedef struct {
+    const Point *star; /* (stars + 1,), the last one, which is none, at infinity */
+    const double *variance_m2;
+    const uint8_t *is_dropped; /* match no spot to these */
+    int64_t stars;
+    const int32_t *raster; /* (rows, columns): nearest star, or the number of stars for none */
+    int64_t columns, rows;
+    double x0_m, y0_m, cells_per_m;
+    double area_m2, density_m2, tolerance_m;
+    const double *key_m;     /* (triangles, 3): arm, along, across */
+    const int32_t *triangle; /* (triangles, 3): pivot, far, near */
+    const int32_t *starts;   /* first triangle of every cell, one more than there are cells */
+    int64_t cells[3];
+    double cell_m, reach_m;
+    const int32_t *pair; /* (pairs, 2), sorted by length */
+    const double *pair_length_m;
+    int64_t pairs;
+} Sky;
+
+/* settings.TrackerSettings, and the constants beside it. */
+typedef struct {
+    int64_t min_stars, min_stars_prior, identified_spots, pair_spots, pair_spots_total, look_ups, candidates;
+    double centre_floor_px, streak_floor_ratio, evidence_nats, rival_nats, exposure_s, readout_s;
+    const double *sigmas_px;
+    int64_t sigmas;
+    double stray_ratio;
+    const int32_t *ranks;       /* (.., 2): neighbours (near, far) that make a triangle with a spot */
+    const int32_t *rank_groups; /* (groups,): where every group of ranks ends */
+    int64_t groups, neighbours; /* of a spot, itself included, that ranks ask for: at most 16 */
+    int64_t refine_steps;
+    double prior_freedom, clip_sigmas;
+    double min_streak_px, min_streak_share, max_misfit_ratio;
+    int64_t min_streaks, smear_rounds;
+} SearchSettings;
+
+/* One picture in, one answer out. */
+typedef struct {
+    int64_t spots;
+    const double *u_px, *v_px;
+    const double *cov_px2;   /* (spots, 3): uu, uv, vv */
+    const double *streak_px; /* (spots, 2) */
+    int64_t has_prior;
+    double prior_x_m, prior_y_m, prior_heading_rad, prior_cov[9];
+    int64_t has_motion;
+    double vx_table_m_s, vy_table_m_s, omega_rad_s;
+    double *doubles;   /* scratch, gs_star_doubles() */
+    int32_t *integers; /* scratch, gs_star_integers(), zero at first */
+    int64_t is_fix, is_tracked, is_ambiguous, stars;
+    double x_m, y_m, heading_rad, cov[9], evidence_nats;
+    double best_nats, guess[3];       /* of a refused picture */
+    int32_t *spot_index, *star_index; /* (stars,), room for every spot */
+    Point *residual_m;
+} StarPicture;
+
+int64_t gs_star_doubles(int64_t spots);
+int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *settings);
+
+/* Search one picture. */
+void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture);
+
+/* ---- The filter's states and their order: fusion/error_state.py ---------------------------------------------------
+ *
+ * Behind them stand two slopes per node of the learned surface (learned_surface.py). */
+
+enum { THETA, VX, VY, PX, PY, GYRO_BIAS, ACC_BIAS_X, ACC_BIAS_Y, SLOPE_X, SLOPE_Y, GYRO_SCALE, LEVER_X, LEVER_Y };
+enum { WAVE_X = 13, WAVE_Y, MXX, MXY, MYX, MYY, GYRO_TEMPCO, ACC_TEMPCO_X, ACC_TEMPCO_Y, FIX_DELAY, SIZE };
+enum { MOVING = 5, MAX_NODES = 64 };
+
+/* ---- One IMU packet after another: reckon.c ----------------------------------------------------------------------- */
+
+/* What happened to a packet. */
+enum {
+    BEHIND = 1,   /* the stamp is not after the last one's: nothing was done */
+    WILD = 2,     /* the readings jumped away: the last good ones were taken */
+    HOLE = 4,     /* packets are missing before this one: there is a row for them too */
+    DISAGREE = 8, /* the stamp is too far from the tick: it was followed */
+};
+
+/* A row of the history; see packet_history.py. */
+typedef struct {
+    double end_s, span_s, omega, ax, ay, warmth, is_hole;
+} Packet;
+
+typedef struct {
+    double omega, ax, ay;
+} Readings;
+
+/* estimator.ImuPacket, field by field. */
+typedef struct {
+    int64_t t_ns;
+    double dt_s, omega_rad_s, ax_m_s2, ay_m_s2, temperature_c;
+} ImuPacket;
+
+/* estimator.PlanarState, field by field: of the centre of mass. */
+typedef struct {
+    int64_t t_ns;
+    double x_m, y_m, heading_rad, vx_m_s, vy_m_s, omega_rad_s;
+    double bias_omega_rad_s, bias_ax_m_s2, bias_ay_m_s2;
+    double std_x_m, std_y_m, std_heading_rad;
+    _Bool is_lost;
+} PlanarState;
+
+typedef struct {
+    ImuPacket asked;
+    PlanarState state; /* is_lost is the caller's */
+    Packet row, hole_row; /* new ones of the history, that of a hole before the packet's */
+
+    /* constants */
+    double period_s, max_jitter_s, stamp_gain;
+    double gyro_lag_s, acc_lag_s, lag_difference_s;
+    double max_rate_step, max_force_step, full_rate, full_force;
+
+    /* clock */
+    int64_t is_restarted; /* take the next packet although its stamp lies behind */
+    int64_t origin_ns, newest_ns;
+    double newest_s;
+    int64_t is_begun; /* a packet has come */
+
+    /* screen */
+    int64_t has_last, has_suspect;
+    Readings last, suspect;
+
+    /* what holds since the last fix */
+    int64_t has_pose;
+    double rest_from_s, rest_to_s, checkpoint_s;
+    double variance[13];
+    double gyro_bias, gyro_tempco, gyro_gain;
+    double acc_bias_x, acc_bias_y, acc_tempco_x, acc_tempco_y;
+    double mxx, mxy, myx, myy;
+    double gx, gy; /* slope, wave and what a map says */
+    double lever_x, lever_y;
+
+    /* now */
+    double theta, vx, vy, px, py;
+    double omega, force_x, force_y;
+    double warmth, temperature_c, reference_c;
+    double bg, bax, bay; /* at the present temperature */
+    Readings good;       /* the newest that were integrated */
+} Reckoner;
+
+/* Take the packet that is asked and report; return what happened, see the flags above. */
+int gs_reckoner_add(Reckoner *r);
+
+/* The state of the centre of mass now: sensor lag undone, lever arm taken off. */
+void gs_reckoner_report(Reckoner *r);
+
+/* Biases at the present temperature. */
+void gs_reckoner_warm(Reckoner *r);
+
+/* ---- A stretch of stored packets: carry.c ------------------------------------------------------------------------- */
+
+/* slope_grid.SlopeGrid: the pull of the table on a grid, row by row. */
+typedef struct {
+    const double *x, *y;
+    int64_t rows, columns;
+    double x0_m, y0_m, step_m, mean_x, mean_y;
+} Grid;
+
+/* A stretch and the state at its start. */
+typedef struct {
+    const Packet *history;
+    int64_t count;
+    double start_s, stop_s, lag_difference_s, gyro_density, acc_density;
+    double knock_m_s, knock_step_m_s2; /* of a switching valve: its size, the change of force that shows it */
+    int64_t knock_group;               /* packets whose mean force is looked at */
+    const Grid *map;
+    double x[SIZE];
+    /* answered */
+    double moved[MOVING];
+    double duration_s, turned_rad; /* all of it; the middle of the last packet against the start */
+    double F[MOVING * SIZE];
+    double Q[MOVING * MOVING];
+    /* between calls */
+    int64_t first, last;
+} Stretch;
+
+/* Motion alone; returns the number of packets. */
+int64_t gs_stretch_fly(Stretch *s);
+
+/* Motion, and how the covariance goes with it. */
+int64_t gs_stretch_carry(Stretch *s);
+
+/* ---- A late fix: late_fix.c ---------------------------------------------------------------------------------------- */
+
+/* Let the local slope be that of a place, in place; 0 if the nodes say too little of it, and nothing was done.
+ * w: (2, 2m) regression weights, answered. */
+int gs_surface_look(const double *nodes, const double *inverse, int64_t m, double length, double place_x, double place_y,
+                    double variance, double unknown_share, double *x, double *P, double *w);
+
+/* Expected slope at a place, given the nodes' part of the state. */
+void gs_surface_slope(const double *nodes, const double *inverse, int64_t m, double length, double place_x,
+                      double place_y, const double *at_nodes, double *slope);
+
+/* Correct x (n) and P (n, n) in place by three measurements of the first 23 states, unless they lie outside the gate.
+ * z: (3) innovation; H: (3, 23); S: (3, 3) the measurements' covariance, answered as the innovation's. Answered: weight
+ * (3, 3) its inverse, K (n, 3) gain; the value is z' weight z. */
+double gs_correct(double *x, double *P, int64_t n, const double *z, const double *H, double *S, double gate,
+                  double *weight, double *K);
+
+/* Coefficients (13) of the variances of x, y and heading in the time after the fix. */
+void gs_variance_in_time(const double *x, const double *P, int64_t n, double acc_density, double gyro_density,
+                         double *out);
+
+#pragma GCC visibility pop
+
+#endif

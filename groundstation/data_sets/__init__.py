@@ -1,0 +1,1 @@
+"""Data sets in folders: pictures of a ceiling, packets and fixes of a flight."""

@@ -1,0 +1,97 @@
+"""The folder of a fusion data set: imu.csv, stars.csv and the `known` block of meta.json."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundstation.files.errors import FileError
+from groundstation.files.json_file import parse_json
+from groundstation.files.reading import read_bytes
+from groundstation.files.tables import load_table
+from groundstation.files.values import number, numbers
+from groundstation.fusion.flight_data import FlightData
+from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth, packet_density
+
+IMU_COLUMNS = ("t_s", "omega_rad_s", "ax_m_s2", "ay_m_s2", "temperature_C")
+STAR_COLUMNS = ("t_exposure_s", "t_arrival_s", "x_m", "y_m", "heading_rad")
+POSITIVE_KEYS = (
+    "duration_s", "imu_rate_hz", "poll_rate_hz", "star_sigma_xy_m", "star_sigma_heading_rad",
+)  # fmt: skip
+FIX_TIME_POLLS = 1.0
+"""How well an exposure's stamp can be laid on the packets: nothing happens between two polls of the sensors.
+Data sets do not give it; live, the clock's own sigma goes into each fix's covariance instead."""
+FIX_DELAY_POLLS = 0.5
+"""The constant part of it: what the best calibration of a camera's delay leaves."""
+OTHER_KEYS = (
+    "run_start_s", "imu_offset_sigma_m", "gyro_noise_poll_rad_s", "acc_noise_poll_m_s2", "gyro_lsb_rad_s",
+    "acc_lsb_m_s2", "gyro_tempco_rad_s_C", "acc_tempco_m_s2_C", "gyro_bandwidth_hz", "acc_bandwidth_hz",
+)  # fmt: skip
+
+
+def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
+    """Read imu.csv, stars.csv and the `known` block of meta.json.
+
+    Raises:
+        FileError: A file, column, key or value is missing or wrong.
+    """
+    if not folder.is_dir():
+        raise FileError(f"{folder}: is no folder with imu.csv, stars.csv and meta.json.")
+    known = read_known(folder / "meta.json")
+    # what is no number is refused packet by packet, with a reason
+    imu = load_table(folder / "imu.csv", IMU_COLUMNS, is_finite=False).numbers
+    stars = np.empty((0, len(STAR_COLUMNS)))
+    if with_stars:
+        stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
+    # a stamp that is no number sorts to the end, where it is refused with a reason
+    stars = stars[np.argsort(stars[:, 1], kind="stable")]
+    noise = noise_of(known)
+    variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
+    covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
+    return FlightData(imu, stars, covariance, known["run_start_s"], noise)
+
+
+def noise_of(known: dict[str, Any]) -> NoiseModel:
+    """Turn the `known` block into the filter's error model."""
+    poll = known["poll_rate_hz"]
+    return NoiseModel(
+        packet_period_s=1.0 / known["imu_rate_hz"],
+        gyro_density_rad_s_rthz=packet_density(known["gyro_noise_poll_rad_s"], known["gyro_lsb_rad_s"], poll),
+        acc_density_m_s2_rthz=packet_density(known["acc_noise_poll_m_s2"], known["acc_lsb_m_s2"], poll),
+        star_sigma_xy_m=known["star_sigma_xy_m"],
+        star_sigma_heading_rad=known["star_sigma_heading_rad"],
+        fix_time_sigma_s=FIX_TIME_POLLS / poll,
+        fix_delay_sigma_s=FIX_DELAY_POLLS / poll,
+        imu_offset_x_m=known["imu_offset_m"][0],
+        imu_offset_y_m=known["imu_offset_m"][1],
+        imu_offset_sigma_m=known["imu_offset_sigma_m"],
+        gyro_tempco_rad_s_c=known["gyro_tempco_rad_s_C"],
+        acc_tempco_m_s2_c=known["acc_tempco_m_s2_C"],
+        gyro_lag_s=lag_of_bandwidth(known["gyro_bandwidth_hz"]),
+        acc_lag_s=lag_of_bandwidth(known["acc_bandwidth_hz"]),
+    )
+
+
+def read_known(path: Path) -> dict[str, Any]:
+    """Read and check the `known` block of a meta.json.
+
+    Raises:
+        FileError: a key is missing or wrong.
+    """
+    meta = parse_json(read_bytes(path), path)
+    known = meta.get("known")
+    if not isinstance(known, dict):
+        raise FileError(f'{path}: has no block "known".')
+    try:
+        for key in (*POSITIVE_KEYS, *OTHER_KEYS):
+            if number(known, key, f"known.{key}") <= 0.0 and key in POSITIVE_KEYS:
+                raise ValueError(f"known.{key} must be above zero, found {known[key]!r}")
+        numbers(known, "imu_offset_m", 2, "known.imu_offset_m")
+    except ValueError as error:
+        raise FileError(f"{path}: {error}.") from error
+    for noise, lsb in (("gyro_noise_poll_rad_s", "gyro_lsb_rad_s"), ("acc_noise_poll_m_s2", "acc_lsb_m_s2")):
+        if min(known[noise], known[lsb]) < 0.0 or known[noise] + known[lsb] == 0.0:
+            raise FileError(f"{path}: known.{noise} and known.{lsb} must not be negative nor both zero.")
+    return known

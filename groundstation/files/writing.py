@@ -1,0 +1,91 @@
+"""Files written whole or not at all, alone or several together."""
+
+import errno
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from groundstation.files.errors import FileError
+
+Content = bytes | str | Iterable[str]
+
+
+def check_targets(*paths: Path | None) -> None:
+    """Refuse targets that cannot be written before any work is done.
+
+    Raises:
+        FileError: A folder does not exist, or a target is one.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        if not path.parent.is_dir():
+            raise FileError(f"{path}: cannot be written, there is no folder {path.parent}.")
+        if path.is_dir():
+            raise FileError(f"{path}: cannot be written, it is a folder.")
+
+
+def write_files(contents: Mapping[Path, Content]) -> None:
+    """Write all of them, or leave what was there.
+
+    Args:
+        contents: Bytes, text or lines by the file they go to.
+
+    Raises:
+        FileError: A folder does not exist or cannot be written.
+    """
+    parts: dict[Path, Path] = {}
+    path = Path()
+    try:
+        for path, content in contents.items():
+            parts[path] = path.with_name(f".{path.name}.{os.getpid()}.part")
+            with parts[path].open("wb") as file:
+                if isinstance(content, bytes):
+                    file.write(content)
+                else:
+                    file.writelines(
+                        line.encode() for line in ([content] if isinstance(content, str) else content)
+                    )
+        for path in parts:
+            if path.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        for path, part in parts.items():
+            os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error}).") from error
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+
+
+def write_file(path: Path, content: Content) -> None:
+    """Write one file whole or not at all.
+
+    Raises:
+        FileError: The folder does not exist or cannot be written.
+    """
+    write_files({path: content})
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Give an empty folder whose files come to ``path`` when all has gone well, and nowhere otherwise.
+
+    Files that are there already stay, unless they have the name of a new one.
+
+    Raises:
+        FileError: The folder cannot be made, or a file is in its place.
+    """
+    try:
+        if path.exists() and not path.is_dir():
+            raise FileExistsError(errno.EEXIST, "a file is in its place")
+        made = tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise FileError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
+    with made as unfinished:
+        yield Path(unfinished)
+        path.mkdir(exist_ok=True)
+        for file in sorted(Path(unfinished).iterdir()):
+            file.replace(path / file.name)

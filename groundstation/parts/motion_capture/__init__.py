@@ -1,0 +1,1 @@
+"""Motion capture as a source of fixes and as a reference."""

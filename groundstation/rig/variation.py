@@ -1,0 +1,52 @@
+"""A rig with some of its keys changed: for dispersions, sweeps and tests, without another file."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+from groundstation.declarations.errors import RigError
+from groundstation.declarations.rig import Rig
+from groundstation.rig.read import build_rig, bytes_of, source_of
+
+
+def varied(rig: Rig, changes: Mapping[str, object]) -> Rig:
+    """The rig with other values; the files that it names are not read again unless a change names another.
+
+    Args:
+        rig: As it was read.
+        changes: By key, as the file spells it: ``mock_ups.standard.mass_kg``. An entry of a list of tables
+            is found by its name: ``laboratory.alpha.mass_kg`` is that of ``[[laboratory.vehicles]]``.
+
+    Raises:
+        RigError: A key leads nowhere, or the rig refuses its value.
+    """
+    source = source_of(rig)
+    content = deepcopy(source.content)
+    for key, value in changes.items():
+        _set(content, key, value)
+    return build_rig(content, source.path, bytes_of(rig), type(rig).tables)
+
+
+def _set(content: dict[str, Any], key: str, value: object) -> None:
+    *way, last = key.split(".")
+    found: object = content
+    for place, name in enumerate(way):
+        found = _step(found, name)
+        if found is None:
+            raise RigError(f"{'.'.join(way[: place + 1])}: the rig has no such table")
+    if not isinstance(found, dict):
+        raise RigError(f"{'.'.join(way)}: is no table of the rig")
+    found[last] = value
+
+
+def _step(table: object, name: str) -> object:
+    if not isinstance(table, dict):
+        return None
+    if name in table:
+        return table[name]
+    for entries in table.values():
+        if isinstance(entries, list):
+            for entry in entries:
+                if isinstance(entry, dict) and entry.get("name") == name:
+                    return entry
+    return None

@@ -1,0 +1,64 @@
+"""Wild packets: one that jumps away and back is not motion."""
+
+from __future__ import annotations
+
+from groundstation.fusion.noise import NoiseModel
+from groundstation.fusion.reckoner import largest_steps
+
+
+class PacketScreen:
+    """Holds back a packet that differs too much from the last good one, unless the next agrees with it.
+
+    A valve or a push lasts several packets and is believed at the second; a flipped bit or a loose plug does
+    not. The limits are the rig's: largest force and torque over mass and inertia, plus noise.
+    """
+
+    __slots__ = ("_full_acc", "_full_rate", "_last", "_suspect", "max_acc_step", "max_rate_step")
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self._full_rate = noise.full_scale_rad_s
+        self._full_acc = noise.full_scale_m_s2
+        self.max_rate_step, self.max_acc_step = largest_steps(noise)
+        self._last: tuple[float, float, float] | None = None
+        self._suspect: tuple[float, float, float] | None = None
+
+    def forget(self) -> None:
+        """Believe the next packet whatever it is."""
+        self._last = self._suspect = None
+
+    def is_wild(self, omega: float, ax: float, ay: float) -> bool:
+        """Return whether the packet shall not be integrated; NaN and infinity are wild."""
+        last = self._last
+        if last is None:
+            if self._is_beyond_scale(omega, ax, ay):
+                return True
+            self._last = (omega, ax, ay)
+            return False
+        rate, force = self.max_rate_step, self.max_acc_step
+        if (
+            -rate <= omega - last[0] <= rate
+            and -force <= ax - last[1] <= force
+            and -force <= ay - last[2] <= force
+        ):
+            self._last = (omega, ax, ay)
+            self._suspect = None
+            return False
+        suspect = self._suspect
+        if self._is_beyond_scale(omega, ax, ay):
+            return True
+        if (
+            suspect is not None
+            and -rate <= omega - suspect[0] <= rate
+            and -force <= ax - suspect[1] <= force
+            and -force <= ay - suspect[2] <= force
+        ):
+            self._last = (omega, ax, ay)
+            self._suspect = None
+            return False
+        self._suspect = (omega, ax, ay)
+        return True
+
+    def _is_beyond_scale(self, omega: float, ax: float, ay: float) -> bool:
+        """Whether no sensor can have read this; NaN and infinity among it."""
+        rate, force = self._full_rate, self._full_acc
+        return not (-rate <= omega <= rate and -force <= ax <= force and -force <= ay <= force)

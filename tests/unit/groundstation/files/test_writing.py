@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from groundstation.files.errors import FileError
+from groundstation.files.png import png_of, write_png
+from groundstation.files.writing import check_targets, whole_folder, write_files
+
+
+def test_several_files_are_written_together(tmp_path):
+    write_files({tmp_path / "a": b"\x00", tmp_path / "b": "text", tmp_path / "c": (f"{i}\n" for i in "12")})
+    assert [(tmp_path / name).read_bytes() for name in "abc"] == [b"\x00", b"text", b"1\n2\n"]
+
+
+def test_none_is_written_if_one_cannot_be(tmp_path):
+    (tmp_path / "a").write_text("before")
+    (tmp_path / "folder").mkdir()
+    for bad in (tmp_path / "folder", tmp_path / "nowhere" / "b"):
+        with pytest.raises(FileError, match=r": cannot be written \(.+\)\.$"):
+            write_files({tmp_path / "a": "after", bad: "x"})
+        assert (tmp_path / "a").read_text() == "before"
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "folder"]
+
+
+def test_a_failure_while_the_lines_are_made_leaves_nothing(tmp_path):
+    def lines():
+        yield "first\n"
+        raise RuntimeError("no second")
+
+    with pytest.raises(RuntimeError):
+        write_files({tmp_path / "a": lines()})
+    assert not list(tmp_path.iterdir())
+
+
+def test_targets_are_refused_before_any_work(tmp_path):
+    check_targets(tmp_path / "a", None)
+    with pytest.raises(FileError, match="there is no folder"):
+        check_targets(tmp_path / "nowhere" / "a")
+    with pytest.raises(FileError, match="it is a folder"):
+        check_targets(tmp_path)
+
+
+def test_a_folder_comes_whole_or_not_at_all(tmp_path):
+    with pytest.raises(FileNotFoundError), whole_folder(tmp_path / "out") as folder:
+        (folder / "one" / "two").write_text("1")
+    assert not list(tmp_path.iterdir())
+    with whole_folder(tmp_path / "out") as folder:
+        (folder / "one").write_text("1")
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["one"]
+
+
+@pytest.mark.parametrize("what", [np.zeros((4, 5), np.uint8), Figure(figsize=(1, 1))])
+def test_pictures_and_figures_become_png(tmp_path, what):
+    write_png(tmp_path / "a.png", what)
+    data = (tmp_path / "a.png").read_bytes()
+    assert data == png_of(what)
+    assert data.startswith(b"\x89PNG")
