@@ -5,9 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.star_tracker import app
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.stars.sections import StarsOfType
@@ -28,20 +26,20 @@ def rig_of(heading_deg, delay_s):
     )
 
 
-def fly_and_measure(folder, heading_deg, delay_s, seed):
+def fly_and_measure(groundstation, folder, heading_deg, delay_s, seed):
     """The command's call and the file that it wrote."""
     text = rig_of(heading_deg, delay_s)
     rig_path, recording, out = folder / "rig.toml", folder / "turn.mcap", folder / "delay.toml"
     rig_path.write_text(text)
     run_lockstep(parse_rig(text, rig_path), text, rig_path, recording, 14.0, seed, lambda *_: None)
-    call = ["delay", str(recording), "--out", str(out)]
-    CliRunner().invoke(app, [*call, "--plot", str(folder / "delay.png")], catch_exceptions=False)
+    call = ["calibrate", "delay", recording, "--out", out]
+    groundstation(*call, "--plot", folder / "delay.png")
     return call, out
 
 
 @pytest.mark.slow
-def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path):
-    call, out = fly_and_measure(tmp_path, 45.0, 0.055, 3)
+def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path, groundstation):
+    call, out = fly_and_measure(groundstation, tmp_path, 45.0, 0.055, 3)
     found = read_delay(out)
     std_s = tomllib.loads(out.read_text())["delay"]["std"]
     assert math.isclose(found.delay_s, 0.055, abs_tol=3.0 * std_s)
@@ -52,17 +50,17 @@ def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path):
     camera = parse_rig(measured, rig_path).of_type("alpha", StarsOfType).star_camera
     assert camera.delay == (found.delay_s, found.sigma_s)
     with pytest.raises(UsageError, match="star cameras fly on alpha"):
-        CliRunner().invoke(app, [*call, "--vehicle", "beta"], catch_exceptions=False)
+        groundstation(*call, "--vehicle", "beta")
 
 
 @pytest.mark.slow
-def test_the_spread_of_the_delay_is_true_on_other_turns(tmp_path):
+def test_the_spread_of_the_delay_is_true_on_other_turns(tmp_path, groundstation):
     flights = [(90.0, 0.03, 21), (-60.0, 0.08, 22), (150.0, 0.055, 23), (-120.0, 0.03, 24), (30.0, 0.08, 25)]
     squares = []
     for heading_deg, delay_s, seed in flights:
         folder = tmp_path / str(seed)
         folder.mkdir()
-        _, out = fly_and_measure(folder, heading_deg, delay_s, seed)
+        _, out = fly_and_measure(groundstation, folder, heading_deg, delay_s, seed)
         delay = tomllib.loads(out.read_text())["delay"]
         squares.append(((delay["value"] - delay_s) / delay["std"]) ** 2)
         assert delay["std"] < 2e-3

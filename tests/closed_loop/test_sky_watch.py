@@ -5,9 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.star_tracker import app
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.stars.messages import SkyChange, StarFix
@@ -76,7 +74,7 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
 
 
 @pytest.mark.slow
-def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
+def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path, groundstation):
     dead, moved = stars_over_the_start()[2:4]
     text = RIG.read_text().replace("../../calibration", str(RIG.parents[2] / "calibration"))
     text = text.replace("late_s = 0.6", "late_s = 0.0") + "[mock_ups.standard.fusion]\nrest_s = 1.0\n"
@@ -85,8 +83,8 @@ def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
     rig_path, recording, out = tmp_path / "rig.toml", tmp_path / "run.mcap", tmp_path / "amended.csv"
     rig_path.write_text(text)
     run_lockstep(parse_rig(text, rig_path), text, rig_path, recording, 4.5, 3, lambda *_: None)
-    call = ["amend", str(CEILING), str(recording), "--out", str(out)]
-    result = CliRunner().invoke(app, call, catch_exceptions=False)
+    call = ["calibrate", "amend", CEILING, recording, "--out", out]
+    result = groundstation(*call)
     assert f"star {dead[1]}: struck off" in result.stdout
     before, after = StarCatalogue.load(CEILING), StarCatalogue.load(out)
     assert len(after.ids) == len(before.ids)  # one less, one more
@@ -102,4 +100,4 @@ def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path):
     other = tmp_path / "other.csv"
     other.write_text("\n".join(CEILING.read_text().splitlines()[:-1]) + "\n")
     with pytest.raises(UsageError, match="another star list"):
-        CliRunner().invoke(app, ["amend", str(other), *call[2:]], catch_exceptions=False)
+        groundstation("calibrate", "amend", other, *call[3:])

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from groundstation.cli.calibrate import app
-from typer.testing import CliRunner
 
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
@@ -109,14 +107,14 @@ def test_the_controller_pushes_against_the_slope_of_the_map_from_its_first_word(
 
 @pytest.mark.slow
 def test_surveyed_then_flown_with_its_map_a_table_costs_less_gas_and_outages_end_nearer(
-    fly, tmp_path, monkeypatch
+    fly, tmp_path, monkeypatch, groundstation
 ):
     seed = 3
     monkeypatch.syspath_prepend(str(EXAMPLES))
     survey_laps, waypoints = (importlib.import_module(name) for name in ("survey_laps", "waypoints"))
     laps, made = tmp_path / "laps.mcap", tmp_path / "map.toml"
     waypoints.record(survey_laps.RIG, laps, 240.0, survey_laps.surveys(["alpha"]), seed)
-    result = CliRunner().invoke(app, ["table-map", str(laps), "--out", str(made)])
+    result = groundstation("calibrate", "table-map", laps, "--out", made)
     assert result.exit_code == 0, result.output
     without, gas_without, _ = tour(fly, 3, seed)
     with_map, gas_with, _ = tour(fly, 3, seed, made)

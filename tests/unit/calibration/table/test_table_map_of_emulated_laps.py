@@ -1,7 +1,6 @@
 """Laps of the emulated laboratory, flown in lockstep and recorded, against the surface it was built with."""
 
-import importlib.util
-import sys
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,6 @@ from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import fit_surface
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
-from groundstation.recording.writer import Recorder
-from groundstation.rig.provenance import recording_info
 from groundstation.rig.read import load_rig
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
@@ -23,13 +20,15 @@ SEED = 4
 
 
 @pytest.fixture
-def survey_laps(monkeypatch):
-    """The example that flies the laps, as a module."""
-    spec = importlib.util.spec_from_file_location("survey_laps", EXAMPLES / "survey_laps.py")
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "survey_laps", module)
-    spec.loader.exec_module(module)
-    return module
+def fly_laps(monkeypatch):
+    """Flies the laps of the example into a recording."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    survey_laps, waypoints = (importlib.import_module(name) for name in ("survey_laps", "waypoints"))
+
+    def fly(path, duration_s, first):
+        waypoints.record(survey_laps.RIG, path, duration_s, survey_laps.surveys(["alpha"], first), SEED)
+
+    return fly
 
 
 def true_surface(rig):
@@ -42,14 +41,12 @@ def true_surface(rig):
 
 
 @pytest.mark.slow
-def test_the_map_of_emulated_laps_is_the_emulated_table(tmp_path, survey_laps):
-    rig_path = EXAMPLES / "rigs" / "survey_laps.toml"
-    rig = load_rig(rig_path)
+def test_the_map_of_emulated_laps_is_the_emulated_table(tmp_path, fly_laps):
+    rig = load_rig(EXAMPLES / "rigs" / "survey_laps.toml")
     sources = []
     for name, duration_s, first in (("laps", 360.0, 0), ("fresh", 150.0, 9)):
         path = tmp_path / f"{name}.mcap"
-        with Recorder(path, recording_info(rig, rig_path, SEED, None)) as recorder:
-            survey_laps.fly(rig, duration_s, [recorder.record], SEED, first)
+        fly_laps(path, duration_s, first)
         sources.append(read_source(path, None, None))
     laps, fresh = sources[0].logs[0], sources[1].logs[0]
     basis = SurfaceBasis.over(sources[0].bounds_m)
