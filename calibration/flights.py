@@ -148,9 +148,9 @@ def _of_recording(
     return FlightData(
         np.array(imu),
         np.array(stars).reshape(-1, 5),
+        own,
         min(floats_s, imu[-1][0]),
         noise,
-        own,
         np.array(reference).reshape(-1, 4),
         0.0 if camera is None else camera.delay[0],
     )

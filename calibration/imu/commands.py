@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,9 +15,11 @@ from calibration.flights import read_flight
 from calibration.imu import joint as joint_procedure
 from calibration.imu import procedures
 from calibration.imu import tilt as tilt_procedure
+from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
+from groundstation.fusion.flight_data import FlightData
 from groundstation.fusion.table_map import TableMap
 
 Source = Annotated[
@@ -31,11 +35,7 @@ def zero_offset(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = 
 
     Example: groundstation calibrate zero-offset samples/fusion/station --out rest.toml
     """
-    check_targets(out, plot)
-    data = read_flight(source, vehicle, with_stars=False)
-    with refusing(source):
-        found = procedures.offsets_at_rest(data)
-    deliver(found, provenance_of(source), out, plot)
+    _calibrate(source, vehicle, procedures.offsets_at_rest, out, plot, with_stars=False)
 
 
 def zero_offset_fit(
@@ -50,13 +50,10 @@ def zero_offset_fit(
 
     Example: groundstation calibrate zero-offset-fit FOLDER --start-s 10 --end-s 30 --out fit.toml
     """
-    check_targets(out, plot)
     if not end_s > start_s:
         raise UsageError(f"--end-s must be after --start-s, found {start_s:g} and {end_s:g}.")
-    data = read_flight(source, vehicle)
-    with refusing(source):
-        found = procedures.offsets_of_stretch(data, start_s, end_s)
-    deliver(found, provenance_of(source), out, plot)
+    procedure = partial(procedures.offsets_of_stretch, start_s=start_s, end_s=end_s)
+    _calibrate(source, vehicle, procedure, out, plot)
 
 
 def temperature(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
@@ -64,11 +61,7 @@ def temperature(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = 
 
     Example: groundstation calibrate temperature warm_up/ --out temperature.toml
     """
-    check_targets(out, plot)
-    data = read_flight(source, vehicle, with_stars=False)
-    with refusing(source):
-        found = procedures.temperature_slopes(data)
-    deliver(found, provenance_of(source), out, plot)
+    _calibrate(source, vehicle, procedures.temperature_slopes, out, plot, with_stars=False)
 
 
 def gyro_scale(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
@@ -76,11 +69,7 @@ def gyro_scale(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = N
 
     Example: groundstation calibrate gyro-scale samples/fusion/spin --out scale.toml
     """
-    check_targets(out, plot)
-    data = read_flight(source, vehicle)
-    with refusing(source):
-        found = procedures.gyro_scale_by_turns(data)
-    deliver(found, provenance_of(source), out, plot)
+    _calibrate(source, vehicle, procedures.gyro_scale_by_turns, out, plot)
 
 
 def allan(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
@@ -88,11 +77,7 @@ def allan(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) 
 
     Example: groundstation calibrate allan night_at_rest/ --out noise.toml --plot noise.png
     """
-    check_targets(out, plot)
-    data = read_flight(source, vehicle, with_stars=False)
-    with refusing(source):
-        found = procedures.noise_at_rest(data)
-    deliver(found, provenance_of(source), out, plot)
+    _calibrate(source, vehicle, procedures.noise_at_rest, out, plot, with_stars=False)
 
 
 def tilt(
@@ -166,3 +151,19 @@ def joint(
         found = joint_procedure.constants_of_flight(data)
     also = {} if made is None or table_map is None else made.files(table_map)
     deliver(found, provenance_of(source), out, plot, also=also)
+
+
+def _calibrate(
+    source: Path,
+    vehicle: str | None,
+    procedure: Callable[[FlightData], Outcome],
+    out: Path,
+    plot: Path | None,
+    *,
+    with_stars: bool = True,
+) -> None:
+    check_targets(out, plot)
+    data = read_flight(source, vehicle, with_stars=with_stars)
+    with refusing(source):
+        found = procedure(data)
+    deliver(found, provenance_of(source), out, plot)

@@ -8,6 +8,7 @@ it, so runs are compiled per start offset modulo 8 and kept.
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from itertools import groupby
 from operator import attrgetter
 from typing import Annotated, Any, get_args, get_origin
@@ -52,6 +53,8 @@ def _ros_type(annotation: object) -> str:
 
 def _parse(name: str, ros_type: str) -> _Field:
     base, bracket, rest = ros_type.partition("[")
+    if base != "string" and base not in _PRIMITIVES:
+        raise TypeError(f"{name}: {ros_type!r} is no type that a payload can have")
     count = 1 if not bracket else int(rest[:-1] or 0)
     return _Field(name, base, count)
 
@@ -226,8 +229,15 @@ def parts(cls: type[Message]) -> Iterator[Part]:
 
 
 def _put_text(out: bytearray, text: str) -> None:
+    out += _TO_FOUR[len(out) & 3] + (_packed(text) if len(text) < _SHORT else _pack_text(text))
+
+
+def _pack_text(text: str) -> bytes:
     raw = text.encode() + b"\0"
-    out += _TO_FOUR[len(out) & 3] + _LENGTH.pack(len(raw)) + raw
+    return _LENGTH.pack(len(raw)) + raw
+
+
+_packed = lru_cache(512)(_pack_text)  # states, modes, names of units: the same few texts again and again
 
 
 def _take_length(data: bytes, position: int) -> tuple[int, int]:

@@ -4,6 +4,7 @@ Replay follows it. A process packs entries of fixed size and publishes them as `
 is read against the names (nodes, nouns and owners) that stand in the same payload.
 """
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
@@ -57,6 +58,7 @@ ENTRY = np.dtype(
         ("owner", "<u2"),  # index in names
     ]
 )
+_pack = struct.Struct("<qIIBBHHH").pack  # ENTRY, at half the time that NumPy takes
 NO_NODE = 0xFFFF
 _LONGEST_NS = 0xFFFFFFFF
 
@@ -83,12 +85,20 @@ class Entry(NamedTuple):
     wall_ns: int
 
 
+class _Indices(dict[str, int]):
+    """Numbers names in the order in which they are first looked up."""
+
+    def __missing__(self, name: str) -> int:
+        index = self[name] = len(self)
+        return index
+
+
 class JournalWriter:
     """Collects the entries of one process between two publications."""
 
     def __init__(self) -> None:
-        self._names: dict[str, int] = {}
-        self._rows: list[tuple[int, int, int, int, int, int, int, int]] = []
+        self._names = _Indices()
+        self._rows: list[bytes] = []
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -115,16 +125,14 @@ class JournalWriter:
             wall_ns: Time it took, 0 in lockstep.
         """
         names = self._names
-        node_index = NO_NODE if node is None else names.setdefault(node, len(names))
-        noun_index = names.setdefault(noun, len(names))
-        owner_index = names.setdefault(owner, len(names))
         if wall_ns > _LONGEST_NS:
             wall_ns = _LONGEST_NS
-        self._rows.append((now_ns, sequence, wall_ns, kind, 0, node_index, noun_index, owner_index))
+        index = NO_NODE if node is None else names[node]
+        self._rows.append(_pack(now_ns, sequence, wall_ns, kind, 0, index, names[noun], names[owner]))
 
     def take(self) -> tuple[tuple[str, ...], bytes]:
         """Names and packed entries since the last call."""
-        packed = np.array(self._rows, dtype=ENTRY).tobytes()
+        packed = b"".join(self._rows)
         self._rows.clear()
         return tuple(self._names), packed
 

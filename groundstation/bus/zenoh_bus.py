@@ -13,9 +13,10 @@ Latched topics are repeated by their publisher with the same sequence number.
 import json
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 import zenoh
+from zenoh.handlers import Callback
 
 from groundstation.declarations.topic import Delivery, Topic
 
@@ -24,6 +25,7 @@ ALIVE = "alive"
 RECORD = "record"
 LEASE_MS = 2000
 
+T = TypeVar("T")
 Receive = Callable[[str, bytes, bytes], None]
 """Called with key, payload and attachment from Zenoh's thread: append to a queue and return."""
 
@@ -64,6 +66,11 @@ def split_key(key: str) -> tuple[str, str]:
     return ("" if owner == RIG_OWNER else owner), noun
 
 
+def _direct(receive: Callable[[T], None]) -> "Callback[T]":
+    """Let Zenoh's own thread call: a thread for each subscriber costs memory, and a switch for each message."""
+    return Callback(receive, indirect=False)
+
+
 class TopicPublisher:
     """Publishes one topic of one owner on its own key, to whoever subscribes.
 
@@ -80,7 +87,7 @@ class TopicPublisher:
             express=not newest,
         )
         self.is_wanted = always
-        self._listener = None if always else self._publisher.declare_matching_listener(self._match)
+        self._listener = None if always else self._publisher.declare_matching_listener(_direct(self._match))
         if self._listener is not None and self._publisher.matching_status:
             self.is_wanted = True
 
@@ -157,7 +164,7 @@ class ZenohBus:
                 b"" if attachment is None else attachment.to_bytes(),
             )
 
-        self._subscribers.append(self._session.declare_subscriber(key_expression, take))
+        self._subscribers.append(self._session.declare_subscriber(key_expression, _direct(take)))
 
     def announce(self, process: str) -> None:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""
@@ -171,7 +178,7 @@ class ZenohBus:
             told(process, sample.kind == zenoh.SampleKind.PUT)
 
         self._subscribers.append(
-            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", take, history=True)
+            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", _direct(take), history=True)
         )
 
     def close(self) -> None:

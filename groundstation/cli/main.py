@@ -135,9 +135,9 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
+    from groundstation.core.library import CoreError
     from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import FileError
-    from groundstation.core.library import CoreError
     from groundstation.recording.errors import RecordingError
 
     words = spelled(words)

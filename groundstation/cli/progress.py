@@ -5,9 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import track
-
 Progress = Callable[[str, float], None]
 """Takes what is going on and how much of it is done, 0 to 1; NaN where nobody knows."""
 
@@ -19,6 +16,9 @@ def silent(what: str, share: float) -> None:
 
 def with_progress(frames: Sequence[Path], what: str) -> Iterator[Path]:
     """Iterate with a progress bar."""
+    from rich.console import Console  # 50 ms, where a bar may be seen
+    from rich.progress import track
+
     console = Console(stderr=True)
     yield from track(
         frames, description=what, console=console, disable=not console.is_terminal, transient=True
@@ -28,6 +28,8 @@ def with_progress(frames: Sequence[Path], what: str) -> Iterator[Path]:
 @contextmanager
 def progress_line() -> Iterator[Progress]:
     """Show progress as one line."""
+    from rich.console import Console
+
     console = Console(stderr=True)
     if not console.is_terminal:
         yield silent

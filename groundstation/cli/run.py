@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.core.library import default_core
 from groundstation.recording.writer import PART_SUFFIX
 from groundstation.rig.read import parse_rig, read_text
 

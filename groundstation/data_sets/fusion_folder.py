@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
 from groundstation.files.tables import load_table
+from groundstation.files.values import number, numbers
 from groundstation.fusion.flight_data import FlightData
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth, packet_density
 
@@ -47,7 +47,10 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
     # a stamp that is no number sorts to the end, where it is refused with a reason
     stars = stars[np.argsort(stars[:, 1], kind="stable")]
-    return FlightData(imu, stars, known["run_start_s"], noise_of(known))
+    noise = noise_of(known)
+    variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
+    covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
+    return FlightData(imu, stars, covariance, known["run_start_s"], noise)
 
 
 def noise_of(known: dict[str, Any]) -> NoiseModel:
@@ -81,23 +84,14 @@ def read_known(path: Path) -> dict[str, Any]:
     known = meta.get("known")
     if not isinstance(known, dict):
         raise FileError(f'{path}: has no block "known".')
-    for key in (*POSITIVE_KEYS, *OTHER_KEYS):
-        _check_number(path, f"known.{key}", known.get(key), positive=key in POSITIVE_KEYS)
-    offset = known.get("imu_offset_m")
-    if not (isinstance(offset, list) and len(offset) == 2):
-        raise FileError(f"{path}: known.imu_offset_m must be two numbers in m, found {offset!r}.")
-    for value in offset:
-        _check_number(path, "known.imu_offset_m", value, positive=False)
+    try:
+        for key in (*POSITIVE_KEYS, *OTHER_KEYS):
+            if number(known, key, f"known.{key}") <= 0.0 and key in POSITIVE_KEYS:
+                raise ValueError(f"known.{key} must be above zero, found {known[key]!r}")
+        numbers(known, "imu_offset_m", 2, "known.imu_offset_m")
+    except ValueError as error:
+        raise FileError(f"{path}: {error}.") from error
     for noise, lsb in (("gyro_noise_poll_rad_s", "gyro_lsb_rad_s"), ("acc_noise_poll_m_s2", "acc_lsb_m_s2")):
         if min(known[noise], known[lsb]) < 0.0 or known[noise] + known[lsb] == 0.0:
             raise FileError(f"{path}: known.{noise} and known.{lsb} must not be negative nor both zero.")
     return known
-
-
-def _check_number(path: Path, key: str, value: object, *, positive: bool) -> None:
-    if value is None:
-        raise FileError(f"{path}: has no key {key}.")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise FileError(f"{path}: {key} must be a finite number, found {value!r}.")
-    if positive and value <= 0.0:
-        raise FileError(f"{path}: {key} must be above zero, found {value!r}.")

@@ -91,7 +91,8 @@ class Argument:
         if isinstance(given, float) and not math.isfinite(given):
             raise ArgumentError(f"{action}: {self.name} is {given}, expected a finite number")
         if isinstance(given, float | int) and not self.low <= given <= self.high:
-            raise ArgumentError(f"{action}: {self.name} is {given:g}, expected {self.low:g} to {self.high:g}")
+            shown = f"{given:g}" if isinstance(given, float) else _short(given)
+            raise ArgumentError(f"{action}: {self.name} is {shown}, expected {self.low:g} to {self.high:g}")
         return given
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,26 +26,20 @@ class FlightData:
     Attributes:
         imu: (n, 5) stamp s, omega, ax, ay, temperature, in the order of arrival.
         stars: (m, 5) exposure s, arrival s, x, y, heading, in the order of arrival.
+        covariance: (m, 3, 3) of each fix.
         run_start_s: Until then the vehicle stands still.
         noise: Of sensors and fixes.
-        covariance: (m, 3, 3) of each fix; that of ``noise`` if not given.
         reference: (k, 4) s, x, y, heading by motion capture or an emulator; for judging results only.
         stamp_delay_s: What was taken off the arrivals to give the exposures.
     """
 
     imu: Array
     stars: Array
+    covariance: Array
     run_start_s: float
     noise: NoiseModel
-    covariance: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
     reference: Array = field(default_factory=lambda: np.empty((0, 4)))
     stamp_delay_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        if len(self.covariance) != len(self.stars):
-            xy, heading = self.noise.star_sigma_xy_m**2, self.noise.star_sigma_heading_rad**2
-            same = np.tile(np.diag([xy, xy, heading]), (len(self.stars), 1, 1))
-            object.__setattr__(self, "covariance", same)
 
     def at_rest(self) -> Array:
         """Return the packets (r, 5) of the rest at the start."""
@@ -56,15 +50,7 @@ class FlightData:
         imu = self.imu[np.isfinite(self.imu[:, 0])]
         rising = imu[:, 0] > np.maximum.accumulate(np.concatenate([[-np.inf], imu[:-1, 0]]))
         order = np.argsort(self.stars[:, 1], kind="stable")
-        return FlightData(
-            imu[rising],
-            self.stars[order],
-            self.run_start_s,
-            self.noise,
-            self.covariance[order],
-            self.reference,
-            self.stamp_delay_s,
-        )
+        return replace(self, imu=imu[rising], stars=self.stars[order], covariance=self.covariance[order])
 
 
 def estimate(

@@ -32,6 +32,8 @@ ANSWER_WITHIN_S = 10.0
 """A server that still loads what it needs answers late; one that takes longer is given up."""
 
 _SET_CHILD_SUBREAPER = 36  # <sys/prctl.h>
+_ARENA_MAX = -8  # <malloc.h>
+_LOADED = b"loaded"
 _PID = struct.Struct("<i")
 _ARGUMENTS = 45  # field of /proc/self/stat behind the name: where the command line begins in memory
 _KEPT_OPEN = 3  # stdin, stdout, stderr
@@ -108,7 +110,17 @@ class ForkServer:
         self._modules = modules
         self._socket: socket.socket | None = None
         self._popen: subprocess.Popen[bytes] | None = None
+        self._is_loaded = False
         self.pid: int | None = None
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether it has loaded its modules, and forks at once."""
+        if not self._is_loaded and self._socket is not None:
+            self._is_loaded = bool(select.select([self._socket], [], [], 0.0)[0])
+            if self._is_loaded:
+                self._socket.recv(len(_LOADED))
+        return self._is_loaded
 
     def start(self) -> None:
         """Start the server, or another one for a server that has ended.
@@ -119,7 +131,7 @@ class ForkServer:
         _adopt_orphans()
         self.close()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket = ours
+        self._socket, self._is_loaded = ours, False
         with theirs:
             if _has_threads():  # they would be missing in the copy, their locks perhaps held
                 self._start_interpreter(theirs.fileno())
@@ -191,6 +203,8 @@ class ForkServer:
     def _ask_once(self, descriptors: list[int]) -> int:
         if self._socket is None:
             raise ConnectionError("it was not started")
+        if not self._is_loaded:
+            self._is_loaded = self._socket.recv(len(_LOADED)) == _LOADED
         socket.send_fds(self._socket, [b"f"], descriptors)
         answer = self._socket.recv(_PID.size)
         if len(answer) != _PID.size:
@@ -245,6 +259,13 @@ def _adopt_orphans() -> None:
         raise GroundStationError("processes can be started on Linux only")
 
 
+def share_one_arena() -> None:
+    """Let all threads of a process allocate from one place: one for each costs a megabyte a process."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc has it
+    if mallopt is not None:
+        mallopt(_ARENA_MAX, 1)
+
+
 def _has_threads() -> bool:
     """Whether this process has threads, be it of Python or of a library."""
     return len(list(Path("/proc/self/task").iterdir())) > 1
@@ -261,10 +282,12 @@ def _serve(requests: socket.socket, modules: Iterable[str]) -> None:
     os.dup2(nothing, 1)
     os.close(nothing)
     _set_name("fork_server")
+    share_one_arena()
     for module in modules:
         importlib.import_module(module)
     gc.collect()
     gc.freeze()
+    requests.send(_LOADED)
     while True:
         asked, descriptors, _, _ = socket.recv_fds(requests, 1, 3)
         if not asked:

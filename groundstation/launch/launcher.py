@@ -23,7 +23,7 @@ from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.rig import Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
-from groundstation.launch.fork_server import ForkServer
+from groundstation.launch.fork_server import ForkServer, share_one_arena
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
@@ -75,22 +75,22 @@ class Launcher:
         self._began_s = 0.0
         self._time = RunningTime()
         self._fork_server = ForkServer(("groundstation.launch.preload",))
+        self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
         self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
     def start(self) -> None:
-        """Start everything; processes go once the laboratory has announced its ports."""
+        """Start what processes need; they are started, and go, as soon as that is there."""
         self._began_s = time.monotonic()
+        share_one_arena()
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
         self.endpoint, self._hub = _open_hub()
         self.bus = ZenohBus(self.endpoint)
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
-        for child in self._children.values():
-            self._start(child)
 
     @property
     def children(self) -> list[Child]:
@@ -138,6 +138,10 @@ class Launcher:
             self._say("the fork server has ended; another one was started, the processes go on")
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
+        if self._unstarted and self._fork_server.is_loaded:
+            for child in self._unstarted:
+                self._start(child)
+            self._unstarted.clear()
         self._let_go()
         for child in self._children.values():
             self._look_after(child, now_s)
@@ -180,10 +184,10 @@ class Launcher:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
 
     def _look_after(self, child: Child, now_s: float) -> None:
-        if child.name != RECORDER and self._addresses is None:
-            return  # it waits for the laboratory
+        if child.pid is None or (child.name != RECORDER and self._addresses is None):
+            return  # it waits for the fork server or the laboratory
         if child.restart_at_s is not None:
-            if now_s >= child.restart_at_s:
+            if now_s >= child.restart_at_s and self._fork_server.is_loaded:
                 child.restarts += 1
                 self._start(child)
         elif child.has_ended:

@@ -4,7 +4,8 @@ import os
 import queue
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
@@ -42,16 +43,27 @@ def run(orders: Orders) -> None:
     batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     stop_when_asked(lambda: batches.put(None))
     recorder = _begin(orders.recording, info)
-    try:
+    with in_a_sentence(recorder):
         with ZenohBus(orders.endpoint) as bus:
             bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
             bus.announce(orders.process)
-            _record(recorder, batches, bus, orders.process, rig.tables.payloads)
+            write_until_end(recorder, batches, bus, orders.process, rig.tables.payloads)
         recorder.finish()
+
+
+@contextmanager
+def in_a_sentence(recorder: Recorder) -> Iterator[None]:
+    """Name what keeps a recording from being written any further.
+
+    Raises:
+        GroundStationError: The disk is full, or gone.
+    """
+    try:
+        yield
     except OSError as error:
         raise GroundStationError(
             f"{recorder.part_path} cannot be written any further: {error.strerror or error} "
-            f"(after {recorder.message_count} messages, which stay there)"
+            f"(after {recorder.message_count} messages; recovery brings back what is there)"
         ) from error
 
 
@@ -64,7 +76,7 @@ def _begin(path: Path, info: RecordingInfo) -> Recorder:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
-def _record(
+def write_until_end(
     recorder: Recorder,
     batches: "queue.SimpleQueue[bytes | None]",
     bus: ZenohBus,

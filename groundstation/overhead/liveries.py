@@ -14,6 +14,7 @@ from typing import Any
 from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
 from groundstation.files.toml_file import parse_toml
+from groundstation.files.values import number
 
 COLOURS = ("red", "green", "blue")
 MIN_DIFFERENCE_M = 0.02
@@ -118,21 +119,18 @@ def _livery(name: str, table: object) -> Livery:
     if not isinstance(circles, list) or len(circles) != _CIRCLES:
         raise ValueError(f"{name}.circles must be a list of three circles")
     made = []
-    for number, circle in enumerate(circles):
-        where = f"{name}.circles.{number}"
+    for i, circle in enumerate(circles):
+        where = f"{name}.circles.{i}"
         if not isinstance(circle, dict):
             raise ValueError(f"{where} must be a table with colour, x_m and y_m")
         _only(circle, where, ("colour", "x_m", "y_m"))
         try:
-            made.append(
-                Circle(
-                    str(circle.get("colour")), _number(circle, where, "x_m"), _number(circle, where, "y_m")
-                )
-            )
+            x_m, y_m = (number(circle, key, f"{where}.{key}") for key in ("x_m", "y_m"))
+            made.append(Circle(str(circle.get("colour")), x_m, y_m))
         except ValueError as error:
             message = str(error)
             raise ValueError(message if message.startswith(where) else f"{where}: {message}") from error
-    height_m, radius_m = (_number(table, name, key) for key in ("height_m", "radius_m"))
+    height_m, radius_m = (number(table, key, f"{name}.{key}") for key in ("height_m", "radius_m"))
     return Livery(name, (made[0], made[1], made[2]), height_m, radius_m)
 
 
@@ -140,14 +138,6 @@ def _only(table: Mapping[str, Any], where: str, keys: Sequence[str]) -> None:
     unknown = set(table) - set(keys)
     if unknown:
         raise ValueError(f"'{where}.{min(unknown)}' is no known key (a typo?)")
-
-
-def _number(table: Mapping[str, Any], where: str, key: str) -> float:
-    value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        found = "is missing" if key not in table else f"must be a finite number, found {value!r}"
-        raise ValueError(f"{where}.{key} {found}")
-    return float(value)
 
 
 def _look_alike(first: Livery, second: Livery) -> bool:

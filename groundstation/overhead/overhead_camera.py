@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
+from groundstation.files.values import number, numbers, whole_number
 from groundstation.frames import turned_axes
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
+_SIDES = ("width", "height")
+_SINGLE = ("fx", "fy", "cx", "cy", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
+_LISTS = ("dist_k1_k2_p1_p2_k3", "position_table_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,52 +108,26 @@ class OverheadCamera:
         Raises:
             ValueError: A key is missing, unknown or impossible; the message names it.
         """
-        unknown = set(data) - _KEYS.keys()
+        unknown = set(data) - {*_SIDES, *_SINGLE, *_LISTS}
         if unknown:
             raise ValueError(f"'{min(unknown)}' is no key of an overhead camera")
-        found = {key: _numbers(data, key, count) for key, count in _KEYS.items()}
-        k1, k2, p1, p2, k3 = found.pop("dist_k1_k2_p1_p2_k3")
-        x, y, z = found.pop("position_table_m")
-        single = {key: values[0] for key, values in found.items()}
-        sides = {key: single.pop(key) for key in ("width", "height")}
-        for key, value in sides.items():
-            if value != int(value):
-                raise ValueError(f"key '{key}' must be a whole number, not {value}")
+        width, height = (whole_number(data, key) for key in _SIDES)
+        k1, k2, p1, p2, k3 = numbers(data, "dist_k1_k2_p1_p2_k3", 5)
+        x, y, z = numbers(data, "position_table_m", 3)
         return cls(
-            width=int(sides["width"]),
-            height=int(sides["height"]),
+            width=width,
+            height=height,
+            **{key: number(data, key) for key in _SINGLE},
             distortion=(k1, k2, p1, p2, k3),
             position_table_m=(x, y, z),
-            **single,
         )
 
     def to_mapping(self) -> dict[str, Any]:
         """Give the keys of the JSON file."""
-        single = {key: getattr(self, key) for key, count in _KEYS.items() if count == 1}
+        lens, pose = _SINGLE[:4], _SINGLE[4:]
         return {
-            **{key: single[key] for key in ("width", "height", "fx", "fy", "cx", "cy")},
+            **{key: getattr(self, key) for key in (*_SIDES, *lens)},
             "dist_k1_k2_p1_p2_k3": list(self.distortion),
             "position_table_m": list(self.position_table_m),
-            **{key: single[key] for key in ("yaw_rad", "tilt_x_rad", "tilt_y_rad")},
+            **{key: getattr(self, key) for key in pose},
         }
-
-
-_KEYS = {
-    **dict.fromkeys(("width", "height", "fx", "fy", "cx", "cy"), 1),
-    "dist_k1_k2_p1_p2_k3": 5,
-    "position_table_m": 3,
-    **dict.fromkeys(("yaw_rad", "tilt_x_rad", "tilt_y_rad"), 1),
-}
-
-
-def _numbers(data: Mapping[str, Any], key: str, count: int) -> list[float]:
-    if key not in data:
-        raise ValueError(f"key '{key}' is missing")
-    value = data[key] if count > 1 else [data[key]]
-    wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
-    if not isinstance(value, list) or len(value) != count:
-        raise ValueError(f"key '{key}' must be {wanted}, found {data[key]!r}")
-    for item in value:
-        if isinstance(item, bool) or not isinstance(item, int | float) or not math.isfinite(item):
-            raise ValueError(f"key '{key}' must be {wanted}, found {data[key]!r}")
-    return [float(item) for item in value]

@@ -8,7 +8,7 @@ Nothing here reads a clock, so that two equal runs in virtual time give equal by
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
@@ -58,7 +58,8 @@ class Recorder:
         self._flush_period_ns = flush_period_ns
         self._durable = durable
         self._flush_due_ns: int | None = None
-        self._channels: dict[tuple[str, str], int | None] = {}  # by noun and owner
+        self._channels: dict[tuple[type[Message], str], int | None] = {}  # by class and owner
+        self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
         self._latched: dict[tuple[str, str], tuple[int, int]] = {}
         self._file: BinaryIO | None = _open_new(path, self.part_path)
@@ -73,12 +74,14 @@ class Recorder:
             delivered: The payload with its envelope.
             now_ns: Log time: arrival at the recorder live, moment of publication in lockstep.
         """
-        envelope = delivered.envelope
-        kind = type(delivered.payload)
+        envelope, payload = delivered
+        kind = type(payload)
         channel = self._channel(kind, envelope.owner)
         if channel is not None:
-            data = codec_of(kind).encode(delivered.payload)
-            self._add(channel, envelope.sequence, envelope.publish_ns, data, now_ns)
+            encode = self._encoders.get(kind)
+            if encode is None:
+                encode = self._encoders[kind] = codec_of(kind).encode
+            self._add(channel, envelope.sequence, envelope.publish_ns, encode(payload), now_ns)
 
     def record_encoded(self, kind: type[Message], envelope: Envelope, data: bytes, log_ns: int) -> None:
         """Write one message whose payload is already in CDR."""
@@ -161,7 +164,7 @@ class Recorder:
 
     def _channel(self, kind: type[Message], owner: str) -> int | None:
         """Channel of a topic of an owner, registered at first use; None if the policy drops it."""
-        key = (kind.TOPIC.noun, owner)
+        key = (kind, owner)
         try:
             return self._channels[key]
         except KeyError:

@@ -79,23 +79,28 @@ class LockstepRunner:
         if not self._is_running:
             self._begin()
         report_ns = 0
-        laboratory = self._laboratory
+        laboratory, heap, observers, deliver = (
+            self._laboratory,
+            self._heap,
+            self._observers,
+            self._step.deliver,
+        )
         while True:
-            next_ns = self._heap[0][0] if self._heap else until_ns
+            next_ns = heap[0][0] if heap else until_ns
             if not self._arrival_known:
                 self._arrival_ns, self._arrival_known = laboratory.next_arrival_ns(), True
             arrival_ns = self._arrival_ns
-            if arrival_ns is not None and arrival_ns <= min(next_ns, until_ns):
+            if arrival_ns is not None and arrival_ns <= next_ns and arrival_ns <= until_ns:
                 self._arrive(arrival_ns)
                 continue
-            if next_ns > until_ns or not self._heap:
+            if next_ns > until_ns or not heap:
                 break
-            stamp_ns, _, _, what = heapq.heappop(self._heap)
+            stamp_ns, _, _, what = heapq.heappop(heap)
             self.now_ns = stamp_ns
             if isinstance(what, Delivered):
-                for observe in self._observers:
+                for observe in observers:
                     observe(what, stamp_ns)
-                self._step.deliver(what, stamp_ns)
+                deliver(what, stamp_ns)
             elif what is None:
                 self._publish_journal(stamp_ns)
                 self._push(stamp_ns + JOURNAL_PERIOD_NS, _TICK_RANK + 1, None)

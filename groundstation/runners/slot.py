@@ -157,4 +157,4 @@ class Slot:
     def _causes(self, trigger: Cause | None) -> tuple[Cause, ...]:
         if trigger is None:
             return tuple(self._newest.values())
-        return (trigger, *(cause for cause in self._newest.values() if cause is not trigger))
+        return (trigger, *[cause for cause in self._newest.values() if cause is not trigger])

@@ -113,17 +113,14 @@ class Step:
         """Give a message of another process to the nodes that receive it."""
         payload = delivered.payload
         for slot in self._receivers.get((payload.TOPIC.noun, payload.vehicle), ()):
-            if not slot.timing.busy_ns or slot.busy_until_ns <= now_ns:
+            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
                 self._hand_over(slot, delivered, now_ns)
-                continue
-            waiting = slot.waiting  # of a topic with newest delivery only the last one waits
-            if waiting and delivered.envelope.topic.delivery is Delivery.NEWEST:
-                slot.drop(waiting.pop().envelope, now_ns)
-            waiting.append(delivered)
+            else:
+                self._wait(slot, delivered, now_ns)
 
     def free(self, slot: Slot, now_ns: int) -> None:
         """A busy node is done: it takes what has waited longest."""
-        if slot.waiting:
+        if slot.waiting and slot.busy_until_ns <= now_ns:
             self._hand_over(slot, slot.waiting.pop(0), now_ns)
 
     def take_journal(self, now_ns: int) -> Delivered:
@@ -133,6 +130,16 @@ class Step:
         topic = Journal.TOPIC
         sequence = self._sequences.next(topic, self.process)
         return Delivered(Envelope(topic, self.process, sequence, now_ns), payload)
+
+    def _wait(self, slot: Slot, delivered: Delivered, now_ns: int) -> None:
+        """Let a message wait for a busy node; of a topic with newest delivery only the last one waits."""
+        topic, owner = delivered.envelope[:2]
+        if topic.delivery is Delivery.NEWEST:
+            for place, older in enumerate(slot.waiting):
+                if older.envelope[:2] == (topic, owner):
+                    slot.drop(slot.waiting.pop(place).envelope, now_ns)
+                    break
+        slot.waiting.append(delivered)
 
     def _hand_over(self, slot: Slot, delivered: Delivered, now_ns: int) -> None:
         made = slot.receive(delivered, now_ns)

@@ -2,13 +2,17 @@
 
 Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O, no messages.
 
-=============  =========================================================================================
-``detection``   picture -> spots with sub-pixel centres and their covariance
-``rays``        pixel -> point of the ceiling plane relative to the body (full camera model)
-``sky_index``   catalogue -> tables for constant-time look-ups of stars, triangles and pairs
-``tracker``     spots -> ``StarFix`` or ``NoFix``, lost in space or from a prior
-``published``   the published Delaunay method, for comparison
-=============  =========================================================================================
+==================  ====================================================================================
+``camera_model``    lens and mount of a star camera
+``star_catalogue``  where the stars are
+``stamp_delay``     from the exposure to the arrival, as calibrated
+``projection``      where stars fall in a picture
+``detection``       picture -> spots with sub-pixel centres and their covariance
+``rays``            pixel -> point of the ceiling plane relative to the body (full camera model)
+``sky_index``       catalogue -> tables for constant-time look-ups of stars, triangles and pairs
+``tracker``         spots -> ``StarFix`` or ``NoFix``, lost in space or from a prior
+``published``       the published Delaunay method, for comparison
+==================  ====================================================================================
 
 Frames: pixel (u right, v down, (0, 0) the centre of the top-left pixel), ``body``, ``table``; ceiling
 coordinates are table x, y carried straight up. A pose is the body origin (x, y) in the table and the

@@ -5,7 +5,6 @@ the vehicle's. The mount is ``body_from_camera = Rz(yaw) Rx(tilt_x) Ry(tilt_y)``
 the camera axes in the body frame: looking up with image right along body x.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
+from groundstation.files.values import number, numbers, whole_number
 from groundstation.frames import turned_axes
 
 _SCALARS = (
@@ -115,15 +115,14 @@ class CameraCalibration:
         Raises:
             ValueError: A key is missing or its value is not of its kind; the message names the key.
         """
-        numbers = {key: _number(data, key) for key in _SCALARS}
-        distortion = _numbers(data, "dist_k1_k2_p1_p2_k3", 5)
-        offset = _numbers(data, "mount_offset_body_m", 3)
+        k1, k2, p1, p2, k3 = numbers(data, "dist_k1_k2_p1_p2_k3", 5)
+        x, y, z = numbers(data, "mount_offset_body_m", 3)
         return cls(
-            width=_integer(data, "width"),
-            height=_integer(data, "height"),
-            distortion=(distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]),
-            mount_offset_body_m=(offset[0], offset[1], offset[2]),
-            **numbers,
+            width=whole_number(data, "width"),
+            height=whole_number(data, "height"),
+            distortion=(k1, k2, p1, p2, k3),
+            mount_offset_body_m=(x, y, z),
+            **{key: number(data, key) for key in _SCALARS},
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -146,31 +145,3 @@ class CameraCalibration:
     def with_height(self, ceiling_height_above_camera_m: float) -> "CameraCalibration":
         """Give the same camera under a ceiling of another height."""
         return replace(self, ceiling_height_above_camera_m=ceiling_height_above_camera_m)
-
-
-def _number(data: Mapping[str, Any], key: str) -> float:
-    if key not in data:
-        raise ValueError(f"key '{key}' is missing")
-    return _finite(data[key], key)
-
-
-def _integer(data: Mapping[str, Any], key: str) -> int:
-    value = _number(data, key)
-    if value != int(value):
-        raise ValueError(f"key '{key}' must be a whole number, not {value}")
-    return int(value)
-
-
-def _numbers(data: Mapping[str, Any], key: str, count: int) -> list[float]:
-    if key not in data:
-        raise ValueError(f"key '{key}' is missing")
-    value = data[key]
-    if not isinstance(value, list) or len(value) != count:
-        raise ValueError(f"key '{key}' must be a list of {count} numbers")
-    return [_finite(item, key) for item in value]
-
-
-def _finite(value: object, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"key '{key}' must be a finite number, not {value!r}")
-    return float(value)

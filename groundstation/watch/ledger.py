@@ -43,10 +43,17 @@ _STAGE_OF = {Wrench.TOPIC.noun: "wrench", ValveCommand.TOPIC.noun: "guard", CanO
 _READ: Mapping[str, type[Message]] = {
     kind.TOPIC.noun: kind for kind in (ImuBytes, StarSpots, StarFix, VehicleState)
 }
-_PASSED_ON: Mapping[str, type[Message]] = {
-    kind.TOPIC.noun: kind for kind in (Imu, Wrench, ValveDemand, ValveSelection, ValveCommand, CanOut)
+_BEFORE: Mapping[type[Message], type[Message]] = {
+    Imu: ImuBytes,
+    Wrench: VehicleState,
+    ValveDemand: Wrench,
+    ValveSelection: ValveDemand,
+    ValveCommand: ValveSelection,
+    CanOut: ValveCommand,
 }
-FOLLOWED: Mapping[str, type[Message]] = {**_READ, **_PASSED_ON}
+"""What each link is made from; what was made from something else (a brake, an order to float) is no link."""
+_PASSED_ON = {kind.TOPIC.noun: before.TOPIC.noun for kind, before in _BEFORE.items()}
+FOLLOWED: Mapping[str, type[Message]] = {**_READ, **{kind.TOPIC.noun: kind for kind in _BEFORE}}
 """Classes that the ledger wants, by their nouns; it passes over all others."""
 
 _SPOTS, _STATE = StarSpots.TOPIC.noun, VehicleState.TOPIC.noun
@@ -168,7 +175,7 @@ class Ledger:
 
     def _pass_on(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...]) -> None:
         """A message whose origin is that of what triggered it."""
-        if causes and causes[0].noun in FOLLOWED:
+        if causes and causes[0].noun == _PASSED_ON[key.noun]:
             self._await(causes[0], _Link(key, publish_ns))
 
     def _await(self, cause: Cause, link: _Link) -> None:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from groundstation.cli.calibrate import app
 from typer.testing import CliRunner
 
 from drivers.laboratory import load_laboratory
 from firmware_emulator.plant.air_table import Surface
-from groundstation.cli.calibrate import app
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionCalibration, FusionStatus, VehicleState

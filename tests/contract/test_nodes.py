@@ -1,118 +1,197 @@
-"""Contracts over the node table: who says what, who hears it, and that nobody peeks at truth."""
+"""Contracts over the nodes and ports of every example: who publishes, who receives, who sees truth."""
 
 from pathlib import Path
 
 import pytest
-from groundstation.bus.topics import TOPICS, topic_of
-from groundstation.rig.plan import make_node
-from groundstation.runners.step import build_slots
-from groundstation.runtime.node_table import NODES, Weight, key_of, process_of
-from groundstation.runtime.ports import ports_of
 
 from groundstation.bus.journal import Journal, JournalWriter
-from groundstation.declarations.request import ACTIONS
-from groundstation.declarations.topic import Recorded, Scope
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Weight
+from groundstation.declarations.request import Ack, Request
+from groundstation.declarations.rig import RecordSection
+from groundstation.declarations.topic import Scope
 from groundstation.parts.operation.messages import Diagnostics, Latency
-from groundstation.rig.plan import gives_way, processes_of
-from groundstation.rig.read import load_rig
+from groundstation.parts.table import installed_tables
+from groundstation.recording.policy import ImagePolicy, is_kept
+from groundstation.rig.plan import gives_way, make_node, nodes_of, ports_of, processes_of
+from groundstation.rig.read import load_rig, parse_rig
 from groundstation.runners.slot import Sequences
+from groundstation.runners.step import build_slots
 
 RIG_FILES = sorted((Path(__file__).parents[2] / "examples" / "rigs").glob("*.toml"))
 RIGS = {path.stem: load_rig(path) for path in RIG_FILES}
-OBSERVERS = {"reference_reader"}  # turns truth into a topic; says nothing that a node of the loop hears
+PAYLOADS = installed_tables().payloads
+# one turns truth into a topic, the other asks the laboratory for failures and sees them begin
+OBSERVERS = {"reference_reader", "failure_desk"}
 
 rigs = pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS.keys())
+names = pytest.mark.parametrize("name", RIGS)
 
 
 @pytest.fixture(scope="module")
 def nodes():
     """Every node of every example, by rig and key."""
-    return {name: nodes_of(rig) for name, rig in RIGS.items()}
+    return {
+        name: {placed.key: make_node(rig, placed.key) for placed in nodes_of(rig)}
+        for name, rig in RIGS.items()
+    }
 
 
-def nodes_of(rig):
-    keys = [key_of(row, vehicle) for row in NODES for vehicle in row.vehicles(rig)]
-    return {key: make_node(rig, key) for key in keys}
+def published_by(found):
+    return {(kind, node.vehicle) for node in found.values() for kind in node.outputs}
 
 
-def said_by(found):
-    return {(kind.TOPIC, node.vehicle) for node in found.values() for kind in node.outputs}
-
-
-def test_a_row_of_the_node_table_has_a_name_of_its_own():
-    names = [row.name for row in NODES]
-    assert len(names) == len(set(names))
-    assert {row.answered_by for row in ACTIONS.values()} <= set(names)
-
-
-@pytest.mark.parametrize("name", RIGS)
-def test_what_a_node_hears_and_says_has_a_topic(name, nodes):
+@names
+def test_what_a_node_receives_and_publishes_is_a_topic_of_some_part(name, nodes):
     for key, node in nodes[name].items():
         assert node.inputs, key
         for kind in (*node.inputs, *node.outputs):
-            assert kind.TOPIC.payload is kind, key
+            assert issubclass(kind, Message)
+            assert PAYLOADS[kind.TOPIC.noun] is kind, key
 
 
-@pytest.mark.parametrize("name", RIGS)
+@names
+def test_what_triggers_a_node_in_its_ticks_is_one_of_its_inputs(name, nodes):
+    for key, node in nodes[name].items():
+        if node.trigger is not None:
+            assert node.trigger in node.inputs, key
+            assert node.tick_period_ns > 0, f"{key} is never ticked"
+
+
+@names
 def test_a_topic_of_a_vehicle_has_one_publisher(name, nodes):
     publishers = {}
     for key, node in nodes[name].items():
         for kind in node.outputs:
             if kind.TOPIC.scope is Scope.VEHICLE:
                 publishers.setdefault((kind.TOPIC.noun, node.vehicle), []).append(key)
-    for port in ports_of(RIGS[name]):
-        publishers.setdefault((topic_of(port.reads).noun, port.vehicle), []).append(port.channel)
+    for port, _ in ports_of(RIGS[name]):
+        publishers.setdefault((port.reads.TOPIC.noun, port.vehicle), []).append(port.channel)
     assert {where: who for where, who in publishers.items() if len(who) > 1} == {}
 
 
-@pytest.mark.parametrize("name", RIGS)
-def test_truth_is_heard_by_observers_only(name, nodes):
+@names
+def test_truth_is_received_by_observers_only(name, nodes):
+    for key, node in nodes[name].items():
+        if any(kind.TOPIC.observers_only for kind in node.inputs):
+            assert key.rpartition("/")[2] in OBSERVERS
+            for made in node.outputs:
+                assert made.TOPIC.observers_only or is_answer_or_order(made, nodes[name]), f"{key}: {made}"
+
+
+def is_answer_or_order(kind, found):
+    """It answers whoever asked, or leaves for the laboratory: no node of the loop receives it."""
+    return kind is Ack or not any(kind in node.inputs for node in found.values())
+
+
+def test_truth_arrives_in_some_example(nodes):
+    """The contract above looks at something."""
+    assert any(
+        kind.TOPIC.observers_only
+        for found in nodes.values()
+        for node in found.values()
+        for kind in node.inputs
+    )
+
+
+@names
+def test_what_a_node_receives_is_published_by_somebody(name, nodes):
+    published = published_by(nodes[name]) | {(port.reads, port.vehicle) for port, _ in ports_of(RIGS[name])}
+    kinds = {kind for kind, _ in published} | {Request}  # operators ask, too
     for key, node in nodes[name].items():
         for kind in node.inputs:
-            if kind.TOPIC.observers_only:
-                assert key.rpartition("/")[2] in OBSERVERS
-                assert all(said.TOPIC.observers_only for said in node.outputs)
+            is_received = kind.TOPIC.scope is Scope.RIG or node.sources(kind)
+            assert kind in kinds or not is_received, f"{key} waits for {kind.__name__} for ever"
 
 
-@pytest.mark.parametrize("name", RIGS)
-def test_what_a_node_hears_is_said_by_somebody(name, nodes):
-    said = said_by(nodes[name]) | {(topic_of(port.reads), port.vehicle) for port in ports_of(RIGS[name])}
-    nouns = {topic.noun for topic, _ in said} | {"request"}  # operators ask, too
-    for key, node in nodes[name].items():
-        for kind in node.inputs:
-            is_heard = kind.TOPIC.scope is Scope.RIG or node.vehicles_heard(kind)
-            assert kind.TOPIC.noun in nouns or not is_heard, f"{key} waits for {kind.__name__} for ever"
+def test_every_topic_is_published_in_some_example(nodes):
+    published = {kind for found in nodes.values() for kind, _ in published_by(found)}
+    published |= {port.reads for rig in RIGS.values() for port, _ in ports_of(rig)}
+    published |= {Journal, Diagnostics, Latency}  # of the runner
+    assert set(PAYLOADS.values()) == published
 
 
-def test_every_topic_is_said_in_some_example(nodes):
-    said = {topic for found in nodes.values() for topic, _ in said_by(found)}
-    said |= {topic_of(port.reads) for rig in RIGS.values() for port in ports_of(rig)}
-    said |= {kind.TOPIC for kind in (Journal, Diagnostics, Latency)}  # of the runner
-    assert {topic.noun for topic in TOPICS} == {topic.noun for topic in said}
+def test_every_topic_is_kept_or_received(nodes):
+    received = {kind for found in nodes.values() for node in found.values() for kind in node.inputs}
+    for kind in PAYLOADS.values():
+        assert is_kept(kind.TOPIC, ImagePolicy.SPOTS) or kind in received
+    assert (
+        ImagePolicy(RecordSection().images) is ImagePolicy.SPOTS
+    )  # what a rig keeps unless it says otherwise
 
 
-def test_every_topic_is_kept_or_heard(nodes):
-    heard = {kind.TOPIC for found in nodes.values() for node in found.values() for kind in node.inputs}
-    for topic in TOPICS:
-        assert topic.recorded is Recorded.ALWAYS or topic in heard
-
-
-@pytest.mark.parametrize("name", RIGS)
-def test_what_leaves_through_a_port_is_said_by_a_node_of_the_same_process(name, nodes):
+@names
+def test_what_leaves_through_a_port_is_published_by_a_node_of_the_same_process(name, nodes):
     rig = RIGS[name]
-    homes = {key_of(row, v): process_of(rig, row, v) for row in NODES for v in row.vehicles(rig)}
-    for port in ports_of(rig):
+    homes = {placed.key: placed.process for placed in nodes_of(rig)}
+    for port, process in ports_of(rig):
         for kind, vehicle in port.writes():
-            makers = [k for k, n in nodes[name].items() if kind in n.outputs and n.vehicle == vehicle]
-            assert [homes[key] for key in makers] == [port.process]
+            makers = [
+                key for key, node in nodes[name].items() if kind in node.outputs and node.vehicle == vehicle
+            ]
+            assert [homes[key] for key in makers] == [process]
+
+
+def readers_of(rig, port):
+    """Processes of the nodes that the port's row names as its readers."""
+    (row,) = [row for row in rig.tables.ports if type(port) is row.kind]
+    return {placed.process for placed in nodes_of(rig) if placed.row.name == row.node}
+
+
+def receives(node, port):
+    return port.reads in node.inputs and (
+        port.reads.TOPIC.scope is Scope.RIG or port.vehicle in node.sources(port.reads)
+    )
+
+
+@names
+def test_a_port_lives_where_the_node_lives_that_receives_what_arrives(name, nodes):
+    rig = RIGS[name]
+    homes = {placed.key: placed.process for placed in nodes_of(rig)}
+    for port, process in ports_of(rig):
+        receivers = [key for key, node in nodes[name].items() if receives(node, port)]
+        row = next(row for row in rig.tables.ports if type(port) is row.kind)
+        assert row.node in {key.rpartition("/")[2] for key in receivers} or port.reads.TOPIC.observers_only
+        assert process in readers_of(rig, port)
+        own = [key for key in receivers if key.rpartition("/")[2] == row.node]
+        assert all(homes[key] == process for key in own)
+
+
+MOVED = [
+    (name, row.node)
+    for name, rig in RIGS.items()
+    for row in rig.tables.ports
+    if rig.tables.nodes[row.node].vehicles(rig)
+]
+
+
+@pytest.mark.parametrize(("name", "node"), MOVED, ids=[f"{name}-{node}" for name, node in MOVED])
+def test_a_port_moves_with_its_node_to_another_process(name, node):
+    """A rig that gives a node another process does not blind or deafen the vehicle."""
+    path = next(path for path in RIG_FILES if path.stem == name)
+    is_of_rig = RIGS[name].tables.nodes[node].is_of_rig
+    process = "elsewhere" if is_of_rig else "{vehicle}_elsewhere"
+    text = path.read_text()
+    section = f"[nodes.{node}]\n"
+    more = f'process = "{process}"\n'
+    text = text.replace(section, section + more) if section in text else f"{text}\n{section}{more}"
+    moved = parse_rig(text, path)
+    (row,) = [row for row in moved.tables.ports if row.node == node]
+    channels = [(port.channel, port.vehicle) for port, _ in ports_of(RIGS[name]) if type(port) is row.kind]
+    found = [(port, home) for port, home in ports_of(moved) if type(port) is row.kind]
+    assert [(port.channel, port.vehicle) for port, _ in found] == channels
+    for port, home in found:
+        assert home in {placed.process for placed in nodes_of(moved) if placed.row.name == node}
+        if not row.is_of_rig:
+            assert home == process.replace("{vehicle}", port.vehicle)
+        assert home in processes_of(moved)
 
 
 @rigs
 def test_no_process_holds_a_heavy_node_beside_an_urgent_one(rig):
     held = {}
-    for row in NODES:
-        for vehicle in row.vehicles(rig):
-            held.setdefault(process_of(rig, row, vehicle), set()).add(row.weight)
+    for placed in nodes_of(rig):
+        held.setdefault(placed.process, set()).add(placed.row.weight)
     assert not [name for name, weights in held.items() if {Weight.HEAVY, Weight.URGENT} <= weights]
     assert processes_of(rig)[0] == "commands"
     assert set(processes_of(rig)) == set(held)
@@ -128,3 +207,4 @@ def test_the_processes_together_hold_every_node_once(rig):
         keys += [slot.key for slot in build_slots(rig, process, JournalWriter(), Sequences())]
     everything = build_slots(rig, None, JournalWriter(), Sequences())
     assert sorted(keys) == sorted(slot.key for slot in everything)
+    assert len(keys) == len(set(keys))

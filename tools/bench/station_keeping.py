@@ -9,7 +9,7 @@ from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.rig.read import load_rig, read_text
-from groundstation.watch.report import summarise, wanted
+from groundstation.watch.summary import summarise, wanted
 
 FLOWN_S = 120.0
 

@@ -90,11 +90,11 @@ def floors_of(rig: Rig, vehicle: str) -> dict[str, Floor]:
 
 
 def calibration_files(rig: Rig, vehicle: str) -> Iterator[tuple[str, RigFile]]:
-    """Yield every calibration file of a vehicle's estimator by the name that the rig gives it."""
+    """Yield every calibration file of a vehicle's estimator by its key in the rig."""
     if rig.table.map is not None:
         yield "table.map", rig.table.map
     for number, file in enumerate(rig.of_type(vehicle, ImuOfType).imu.calibration):
-        yield f"{rig.vehicles[vehicle].mock_up}.imu.calibration.{number}", file
+        yield f"mock_ups.{rig.vehicles[vehicle].mock_up}.imu.calibration.{number}", file
 
 
 def calibration_texts(rig: Rig, vehicle: str) -> dict[str, tuple[str, str]]:

@@ -25,7 +25,7 @@ class RefusalGauge(Gauge):
 
     def __init__(self, vehicle: str) -> None:
         super().__init__(vehicle)
-        self.refused: dict[str, int] = {}
+        self._refused: dict[str, int] = {}
         self._now = ""
 
     def take(self, message: Message, now_ns: int) -> Iterator[str]:
@@ -34,19 +34,19 @@ class RefusalGauge(Gauge):
         self._now = ""
         if not message.fix:
             self._now = message.reason.partition(":")[0]  # its kind
-            self.refused[self._now] = self.refused.get(self._now, 0) + 1
+            self._refused[self._now] = self._refused.get(self._now, 0) + 1
         yield from ()
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:
         del newest, now_ns
-        if not self.refused:
+        if not self._refused:
             return NOTHING
-        counts = counts_cell(self.refused)
+        counts = counts_cell(self._refused)
         return cell(f"now: {self._now}; ", Level.BAD) + counts if self._now else counts
 
     def phrase(self, newest: Newest, now_ns: int) -> str:
         del newest, now_ns
-        return f"no fix: {self._now} ({self.refused[self._now]} x)" if self._now else ""
+        return f"no fix: {self._now} ({self._refused[self._now]} x)" if self._now else ""
 
 
 class SkyGauge(Gauge):

@@ -26,11 +26,13 @@ class StarCameraSection(Section):
     sigma_xy_m: Positive = 0.001
     sigma_heading_rad: Positive = 0.0009
 
-    @model_validator(mode="after")
-    def _one_delay(self) -> Self:
-        if self.delay_file is not None and self.model_fields_set & {"delay_s", "delay_sigma_s"}:
+    @model_validator(mode="before")
+    @classmethod
+    def _one_delay(cls, given: object) -> object:
+        """Said before the file is looked for: which of the two was meant decides whether it must be there."""
+        if isinstance(given, dict) and "delay_file" in given and given.keys() & {"delay_s", "delay_sigma_s"}:
             raise ValueError("give either 'delay_file' or 'delay_s' and 'delay_sigma_s'")
-        return self
+        return given
 
     @property
     def delay(self) -> tuple[float, float]:

@@ -124,8 +124,9 @@ class Run:
         found = {}
         for pid in descendants(self.process.pid):
             words = words_of(pid)
-            if "groundstation.runtime.process" in words or "groundstation.runtime.recorder" in words:
-                found[words[-1]] = pid
+            title, _, name = words[0].partition(" ") if words else ("", "", "")
+            if title == "groundstation":
+                found[name] = pid
             elif "firmware_emulator" in words:
                 found["laboratory"] = pid
         return found

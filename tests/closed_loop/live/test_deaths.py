@@ -3,6 +3,7 @@
 import itertools
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,7 @@ def fly_and(launch, rig, name, number):
 
 def of(path, kind, vehicle):
     with Recording(path) as recording:
-        return [row.payload for row in recording.delivered([kind.TOPIC], [vehicle])]
+        return [row.payload for row in recording.delivered([kind], [vehicle])]
 
 
 def longest_silence_s(payloads):
@@ -115,6 +116,33 @@ def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launc
     for vehicle in ("alpha", "beta"):
         assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0
         assert of(run.recording, VehicleState, vehicle)[-1].status == "flying"
+
+
+def test_the_fork_server_may_die_and_what_dies_after_it_is_started_again(launch, two_drawn):
+    run, _ = fly_and(launch, two_drawn, "fork_server", signal.SIGKILL)
+    run.wait_for("the fork server has ended")
+    run.wait_for("alpha", "flying", "open")
+    run.forget()
+    os.kill(run.pids()["alpha_flight"], signal.SIGKILL)
+    run.wait_for("alpha_flight was ended by SIGKILL; starting it again")
+    run.wait_for("alpha/imu: open")
+    run.wait_for("alpha", "flying", "open")
+    assert run.end()[0] == 0
+    assert longest_silence_s(of(run.recording, VehicleState, "beta")) < 1.0
+
+
+def test_a_launcher_that_was_paused_does_not_take_its_own_silence_for_that_of_others(launch, two_drawn):
+    run = launch(two_drawn)
+    run.wait_until_flying()
+    before = run.pids()
+    os.kill(run.process.pid, signal.SIGSTOP)
+    time.sleep(5.0)  # what a person does with Ctrl-Z and fg
+    run.forget()
+    os.kill(run.process.pid, signal.SIGCONT)
+    run.wait_for("alpha", "flying", "open")
+    assert run.pids() == before
+    assert not any("hangs" in line or "starting it again" in line for line in run.lines)
+    assert run.end()[0] == 0
 
 
 def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):

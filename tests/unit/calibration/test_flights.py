@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from calibration.flights import opened, read_flight
-from groundstation.bus.topics import topic_of
 from groundstation.declarations.errors import UsageError
-from groundstation.parts.stars.messages import StarFix
-from groundstation.parts.fusion.estimation import fix_floor_of
 from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.parts.fusion.estimation import fix_floor_of
+from groundstation.parts.stars.messages import StarFix
 from groundstation.rig.read import load_rig
 
 RIGS = Path(__file__).parents[3] / "examples" / "rigs"

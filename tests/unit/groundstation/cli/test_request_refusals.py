@@ -29,7 +29,7 @@ def refused(capsys, *words):
     ("words", "reason"),
     [
         (["alpha", "fly"], "there is no action 'fly' (there are arm, "),
-        (["alpha", "go_to", "0.1"], "go_to takes x_m y_m heading_deg, found 1 numbers"),
+        (["alpha", "go_to", "0.1"], "go_to takes x_m y_m heading_deg, found 1 words"),
         (["alpha", "go_to", "-0.1", "nan", "3"], "finite"),
         (["alpha", "stop"], "no rig is running"),
         (["alpha", "stop", "--pid", "1"], "no rig is running with process 1"),

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.registry import CONTROLLERS, make_controller
+from groundstation.control.registry import controllers, make_controller
 from groundstation.control.state import ControlState, Goal, Wrench
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 
 VEHICLE = VehicleModel(11.0, 0.25, square_of_eight())
 ENVELOPE = WrenchEnvelope(VEHICLE)
-rows = pytest.mark.parametrize("name", CONTROLLERS)
+rows = pytest.mark.parametrize("name", controllers())
 
 anything = st.floats(allow_nan=False, allow_infinity=False)
 pairs = st.tuples(anything, anything)
@@ -25,7 +25,7 @@ spans = st.floats(1e-6, 1e6)
 
 
 def build(name):
-    return make_controller(name, CONTROLLERS[name].example, VEHICLE)
+    return make_controller(name, controllers()[name].example, VEHICLE)
 
 
 @rows
@@ -85,7 +85,7 @@ def test_time_that_does_not_pass_is_refused(name, dt_s):
 @rows
 def test_a_misspelt_setting_is_named(name):
     with pytest.raises(ValidationError, match="speeed"):
-        make_controller(name, {**CONTROLLERS[name].example, "speeed": 1.0}, VEHICLE)
+        make_controller(name, {**controllers()[name].example, "speeed": 1.0}, VEHICLE)
 
 
 def test_an_unknown_controller_is_answered_with_the_known_ones():

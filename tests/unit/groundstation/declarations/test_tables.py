@@ -1,12 +1,12 @@
-"""Parts together: a name that two of them take is refused with both."""
+"""Tables are the parts' rows put together; what does not fit is refused by name."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
 
-from groundstation.bus.journal import Journal
-from groundstation.declarations.message import Message
+from groundstation.declarations.fix import FixSource, PoseFix
+from groundstation.declarations.message import Bool, Message
 from groundstation.declarations.node import Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
@@ -16,57 +16,82 @@ from groundstation.declarations.topic import Topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rain(Message):
-    TOPIC: ClassVar = Topic("rain")
+class Beat(Message):
+    ROS_TYPE: ClassVar[str] = "test/msg/Beat"
+    TOPIC: ClassVar = Topic("beat")
+    strong: Bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OtherRain(Message):
-    TOPIC: ClassVar = Topic("rain")
+class OtherBeat(Message):
+    ROS_TYPE: ClassVar[str] = "test/msg/OtherBeat"
+    TOPIC: ClassVar = Topic("beat")
+    strong: Bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RivalOfTheJournal(Message):
-    TOPIC: ClassVar = Topic("journal")
+class Heart(Node):
+    outputs = (Beat,)
+
+    def receive(self, message, now_ns):
+        return ()
 
 
-def row(name):
-    return NodeRow(name, "station", Weight.LIGHT, Node, lambda rig, vehicle: None)
+def row(name="heart"):
+    return NodeRow(name, "station", Weight.LIGHT, Heart, lambda rig, vehicle: Heart(vehicle))
 
 
-def test_parts_add_up():
-    tables = Tables(
-        [Part("one", "", topics=(Rain,)), Part("two", "", nodes=(row("gauge"),))], topics=(Journal,)
-    )
-    assert list(tables.payloads) == ["journal", "rain"]
-    assert list(tables.nodes) == ["gauge"]
-    assert tables.owner(Rain) == "one"
-    assert tables.owner(Journal) == ""
+def part(name="pulse", **rows):
+    return Part(name, "a beating heart", **rows)
+
+
+def test_rows_of_all_parts_stand_together_in_their_order():
+    tables = Tables([part("one", nodes=(row("a"), row("b")), topics=(Beat,)), part("two", nodes=(row("c"),))])
+    assert list(tables.nodes) == ["a", "b", "c"]
+    assert list(tables.parts) == ["one", "two"]
+    assert tables.payloads == {"beat": Beat}
+    assert (tables.owner(Beat), tables.owner(OtherBeat)) == ("one", "")
+
+
+def test_topics_of_the_runners_belong_to_no_part():
+    tables = Tables([part()], topics=(Beat,))
+    assert tables.payloads == {"beat": Beat}
+    assert tables.owner(Beat) == ""
+
+
+ACTION = Action("skip", "heart", "leave one beat out")
+SOURCE = FixSource("heart", PoseFix, lambda rig, vehicle: True, lambda rig, vehicle: (0.0, 0.0), "a heart")
 
 
 @pytest.mark.parametrize(
-    ("one", "two", "complaint"),
+    ("parts", "sentence"),
     [
-        ({"topics": (Rain,)}, {"topics": (OtherRain,)}, "'one' and 'two' both declare a topic named 'rain'"),
+        ([part(), part()], "two parts declare a part named 'pulse'"),
+        ([part(topics=(Beat,)), part("b", topics=(OtherBeat,))], "two parts declare a topic named 'beat'"),
+        ([part(topics=(Beat, Beat))], "two parts declare a topic named 'beat'"),
+        ([part(nodes=(row(),)), part("b", nodes=(row(),))], "two parts declare a node named 'heart'"),
+        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "two parts declare a action named 'skip'"),
+        ([part(fix_sources=(SOURCE, SOURCE))], "two parts declare a fix source named 'heart'"),
+        ([part(actions=(ACTION,))], "action 'skip' is answered by 'heart', which no part declares"),
         (
-            {"nodes": (row("eye"),)},
-            {"nodes": (row("eye"),)},
-            "'one' and 'two' both declare a node named 'eye'",
+            [part(ports=(PortRow("heart", Port, lambda rig, vehicle: None),))],
+            "a port is read by a node 'heart', which no part declares",
         ),
-        ({"topics": (RivalOfTheJournal,)}, {}, "'of the runners' and 'one' both declare a topic"),
-        (
-            {},
-            {"ports": (PortRow("nobody", Port, lambda rig, vehicle: None),)},
-            "a node 'nobody', which no part",
-        ),
-        ({}, {"actions": (Action("hop", "nobody", ""),)}, "'hop' is answered by 'nobody', which no part"),
     ],
 )
-def test_parts_that_contradict_each_other_are_refused_by_name(one, two, complaint):
-    with pytest.raises(PartError, match=complaint):
-        Tables([Part("one", "", **one), Part("two", "", **two)], topics=(Journal,))
+def test_what_does_not_fit_is_refused_by_name(parts, sentence):
+    with pytest.raises(PartError) as refused:
+        Tables(parts)
+    assert str(refused.value) == sentence
 
 
-def test_two_parts_of_one_name_are_refused():
-    with pytest.raises(PartError, match="both declare a part named 'one'"):
-        Tables([Part("one", ""), Part("one", "")])
+def test_a_topic_of_the_runners_cannot_be_declared_again():
+    with pytest.raises(PartError, match="two parts declare a topic named 'beat'"):
+        Tables([part(topics=(OtherBeat,))], topics=(Beat,))
+
+
+def test_a_node_is_imported_where_it_is_used():
+    later = NodeRow("json", "station", Weight.LIGHT, f"{__name__}:Heart", lambda rig, vehicle: Heart(vehicle))
+    assert isinstance(later.kind, str)
+    lazy = NodeRow("x", "station", Weight.LIGHT, "groundstation.parts.imu.imu_reader:ImuReader", later.make)
+    assert lazy.node_class().__name__ == "ImuReader"
+    assert row().node_class() is Heart

@@ -50,7 +50,9 @@ def test_todays_schema_is_read_by_todays_codec():
 def test_a_recording_without_a_field_of_today_is_refused_by_the_fields_name(lost):
     columns = [column for column in ros_fields(StarFix) if column[0] != lost]
     _, schema = as_other(FIX, columns)
-    with pytest.raises(RecordingError, match=f"^a.mcap: /alpha/star_fix was recorded without the field '{lost}'$"):
+    with pytest.raises(
+        RecordingError, match=f"^a.mcap: /alpha/star_fix was recorded without the field '{lost}'$"
+    ):
         decoder_of(StarFix, schema, "a.mcap: /alpha/star_fix")
 
 
@@ -91,12 +93,19 @@ def test_a_standard_type_under_another_definition_is_refused():
 
 @pytest.mark.parametrize(
     "line",
-    ["float64", "float64 9lives", "float64 class", "float32[x] u_px", "geometry_msgs/Pose pose", "float64 x_m"],
+    [
+        "float64",
+        "float64 9lives",
+        "float64 class",
+        "float32[x] u_px",
+        "geometry_msgs/Pose pose",
+        "float64 x_m",
+    ],
     ids=["no name", "no identifier", "a keyword", "no length", "unknown type", "twice"],
 )
 def test_a_garbled_schema_is_refused_as_such(line):
     schema = schema_text(StarFix).replace("bool fix\n", f"bool fix\n{line}\n")
-    with pytest.raises(RecordingError, match="^x has a schema that cannot be read"):
+    with pytest.raises(RecordingError, match=r"^x has a schema that cannot be read"):
         decoder_of(StarFix, schema, "x")
 
 
@@ -131,7 +140,9 @@ def test_a_file_with_a_field_more_is_read(tmp_path):
     assert same(found.payload, FIX)
 
 
-@pytest.mark.parametrize("metadata", [{"software": "groundstation 0.0.1"}, {"format": "1", "software": "old"}])
+@pytest.mark.parametrize(
+    "metadata", [{"software": "groundstation 0.0.1"}, {"format": "1", "software": "old"}]
+)
 def test_a_recording_of_the_first_format_is_refused_in_a_sentence(tmp_path, metadata):
     path = write(tmp_path / "first.mcap", schema_text(StarFix), codec_of(StarFix).encode(FIX), metadata)
     with pytest.raises(RecordingError) as refused:
@@ -143,7 +154,8 @@ def test_a_recording_of_the_first_format_is_refused_in_a_sentence(tmp_path, meta
 
 
 @pytest.mark.parametrize(
-    ("said", "sentence"), [("3", "recording format 3, this program reads format 2"), ("two", "metadata record")]
+    ("said", "sentence"),
+    [("3", "recording format 3, this program reads format 2"), ("two", "metadata record")],
 )
 def test_a_recording_of_a_format_to_come_is_refused_in_a_sentence(tmp_path, said, sentence):
     path = write(tmp_path / "x.mcap", schema_text(StarFix), b"", {"format": said})

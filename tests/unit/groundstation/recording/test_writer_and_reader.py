@@ -228,7 +228,9 @@ def test_channels_of_others_are_left_alone(tmp_path, flight):
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="ros2")
-        tf = writer.register_schema("tf2_msgs/msg/TFMessage", "ros2msg", b"geometry_msgs/TransformStamped[] t\n")
+        tf = writer.register_schema(
+            "tf2_msgs/msg/TFMessage", "ros2msg", b"geometry_msgs/TransformStamped[] t\n"
+        )
         wrench = writer.register_schema(Wrench.ROS_TYPE, ENCODING, schema_text(Wrench).encode())
         ours = next(d.payload for d in flight if isinstance(d.payload, Wrench))
         writer.add_message(writer.register_channel("/tf", "cdr", tf), 1, bytes(20), 1, 1)
@@ -250,7 +252,9 @@ def test_channels_are_sorted_by_noun_and_owner_and_say_what_they_hold(tmp_path, 
         names = [(channel.noun, channel.owner) for channel in recording.channels]
         assert names == sorted(names)
         published = Counter((d.envelope.topic.noun, d.envelope.owner) for d in flight)
-        assert {name: channel.count for name, channel in zip(names, recording.channels, strict=True)} == published
+        assert {
+            name: channel.count for name, channel in zip(names, recording.channels, strict=True)
+        } == published
         assert recording.has(Wrench, "bravo")
         assert not recording.has(Wrench, "charlie")
 

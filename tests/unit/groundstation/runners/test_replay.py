@@ -129,7 +129,9 @@ class Laboratory:
                 if step % 5 == 4:
                     self.call(node, Kind.TICK, node.tick(now_ns), now_ns)
                 if step % 6 == 1:
-                    self.journal.note(Kind.DROP, f"{node.vehicle}/adder", "imu_bytes", node.vehicle, 999, now_ns)
+                    self.journal.note(
+                        Kind.DROP, f"{node.vehicle}/adder", "imu_bytes", node.vehicle, 999, now_ns
+                    )
                     self.journal.note(Kind.PORT, None, "imu_bytes", node.vehicle, 998, now_ns)
             self.publish(now_ns)
             if step % 10 == 9:

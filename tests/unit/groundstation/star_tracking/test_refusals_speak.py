@@ -6,7 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.star_camera.exposure import ExposureDelay
 from groundstation.declarations.request import Ack, Request
+from groundstation.declarations.rig_file import RigFile
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.stars.messages import StarFix, StarImage, StarMatches, StarPicture
 from groundstation.parts.stars.picture_keeper import PictureKeeper
@@ -18,6 +20,8 @@ from groundstation.star_tracking.picture_notes import NO_SPOT, SpotKind
 from groundstation.star_tracking.tracker import TrackerSettings
 
 PERIOD_NS = 1_000_000_000 // 15
+DELAY = ExposureDelay(0.004, 1e-3)
+DELAY_NS = 4_000_000
 POSE = (2.4, 1.9, 0.7)
 
 
@@ -32,7 +36,9 @@ class Sky:
         settings = TrackerSettings(exposure_s=exposure_s)
         self.nodes = [
             SpotFinder("alpha", (painter.camera.width, painter.camera.height)),
-            StarTracker("alpha", camera, ceiling, 1e-3, settings),
+            StarTracker(
+                "alpha", *(RigFile(path, path.read_bytes()) for path in (camera, ceiling)), DELAY, settings
+            ),
             PictureKeeper("alpha"),
         ]
         self.stamp_ns = 5_000_000_000
@@ -52,11 +58,11 @@ class Sky:
         """All that is said of the next picture."""
         self.stamp_ns += PERIOD_NS
         height, width = image.shape
-        return self.tell(StarImage(self.stamp_ns, "alpha", height, width, "mono8", 0, width, image.tobytes()))
+        return self.tell(StarImage(self.stamp_ns, "alpha", 0, height, width, "mono8", width, image.tobytes()))
 
     def believe(self, pose, velocity=(0.0, 0.0), rate_rad_s=0.0):
         """The filter's state at the exposure that comes next."""
-        stamp_ns = self.stamp_ns + PERIOD_NS
+        stamp_ns = self.stamp_ns + PERIOD_NS - DELAY_NS
         state = VehicleState(
             stamp_ns, "alpha", pose[:2], pose[2], velocity, rate_rad_s, (1e-3,) * 3, "flying", 0
         )
@@ -71,6 +77,9 @@ def sky(tmp_path, painter):
 def reason_of(said):
     (fix,) = said[StarFix]
     assert fix.fix == (fix.reason == "")
+    (image,) = said[StarImage]
+    assert fix.stamp_ns == image.stamp_ns - DELAY_NS  # the middle of the exposure, not the arrival
+    assert fix.stamp_sigma_s == DELAY.delay_std_s
     return fix.reason.partition(":")[0]
 
 
@@ -135,7 +144,7 @@ def test_streaks_are_called_blurred_with_and_without_a_known_motion(tmp_path, pa
 def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     image = painter.paint(np.random.default_rng(5), POSE)
     assert StarMatches not in sky.show(image)
-    (ack,) = sky.tell(Request(sky.stamp_ns, "alpha", 7, "me", "picture", ()))[Ack]
+    (ack,) = sky.tell(Request(sky.stamp_ns, "alpha", 7, "me", "picture", ""))[Ack]
     assert ack.accepted
     said = sky.show(image)
     (fix,), (matches,) = said[StarFix], said[StarMatches]
@@ -157,7 +166,7 @@ def test_a_picture_that_is_no_longer_held_is_not_said(sky, painter):
     (image,), (matches,) = said[StarImage], said[StarMatches]
     assert list(keeper.receive(image, 0)) == []
     assert len(list(keeper.receive(matches, 0))) == 1
-    late = StarImage(image.stamp_ns + 4_000_000_000, "alpha", 480, 640, "mono8", 0, 640, dark.tobytes())
+    late = StarImage(image.stamp_ns + 4_000_000_000, "alpha", 0, 480, 640, "mono8", 640, dark.tobytes())
     assert list(keeper.receive(late, 0)) == []
     assert list(keeper.receive(matches, 0)) == []
 
@@ -167,7 +176,7 @@ def test_the_drawing_rings_stars_green_and_crosses_missing_ones_red(sky, painter
     missing = painter.visible(POSE, margin_px=60)[0]
     lit[missing] = False
     image = painter.paint(np.random.default_rng(6), POSE, lit=lit)
-    sky.tell(Request(sky.stamp_ns, "alpha", 8, "me", "picture", ()))
+    sky.tell(Request(sky.stamp_ns, "alpha", 8, "me", "picture", ""))
     notes = notes_of(sky.show(image)[StarMatches][0])
     drawn = draw_notes(image, notes, "a fix").astype(int)
     assert drawn.shape[0] > 2 * 480
@@ -184,11 +193,11 @@ def test_the_drawing_rings_stars_green_and_crosses_missing_ones_red(sky, painter
 @pytest.mark.parametrize(
     ("image", "words"),
     [
-        (StarImage(1, "alpha", 240, 320, "mono8", 0, 320, bytes(240 * 320)), "320 x 240 px"),
-        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640 - 1)), "cut short"),
-        (StarImage(1, "alpha", 480, 640, "bgr8", 0, 1920, bytes(3 * 480 * 640)), "bgr8"),
-        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, bytes(480 * 640)), "no light spots"),
-        (StarImage(1, "alpha", 480, 640, "mono8", 0, 640, b"\xff" * (480 * 640)), "flooded"),
+        (StarImage(1, "alpha", 0, 240, 320, "mono8", 320, bytes(240 * 320)), "320 x 240 px"),
+        (StarImage(1, "alpha", 0, 480, 640, "mono8", 640, bytes(480 * 640 - 1)), "cut short"),
+        (StarImage(1, "alpha", 0, 480, 640, "bgr8", 1920, bytes(3 * 480 * 640)), "bgr8"),
+        (StarImage(1, "alpha", 0, 480, 640, "mono8", 640, bytes(480 * 640)), "no light spots"),
+        (StarImage(1, "alpha", 0, 480, 640, "mono8", 640, b"\xff" * (480 * 640)), "flooded"),
     ],
     ids=["wrong size", "torn", "colour", "black", "saturated"],
 )

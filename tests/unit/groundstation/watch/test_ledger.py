@@ -163,6 +163,8 @@ def test_what_no_state_triggered_has_no_age(message, delivered, cause):
     flight.publish(CanOut, 1021, stopped)
     flight.publish(CanOut, 1022, request, state)  # an order to float
     flight.publish(CanOut, 1023)
+    brake = flight.publish(ValveSelection, 1024, state)  # no demand came, no wrench did
+    flight.publish(CanOut, 1026, flight.publish(ValveCommand, 1025, brake))
     ledger = Ledger()
     for one in flight.messages:
         ledger.take_delivered(one)

@@ -6,18 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from groundstation.runtime.node_table import check_rig
 
 from calibration.result import CalibrationResult, Provenance, Quantity
 from groundstation.declarations.errors import RigError
 from groundstation.fusion import error_state as es
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
 from groundstation.fusion.table_map import MapProvenance, TableMap
-from groundstation.parts.fusion.estimation import calibration_texts, noise_of, rig_noise, slope_grid_of
-from groundstation.rig.provenance import calibration_hashes
+from groundstation.parts.fusion.estimation import calibration_texts, noise_of, rig_noise
+from groundstation.rig.provenance import file_hashes
 from groundstation.rig.read import parse_rig
 
-RIGS = Path(__file__).parents[4] / "examples" / "rigs"
+RIGS = Path(__file__).parents[5] / "examples" / "rigs"
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
 
 
@@ -51,7 +50,7 @@ def test_a_rig_without_files_gives_its_own_figures(tmp_path):
         0.0004,
         0.2,
     )
-    assert slope_grid_of(rig) is None
+    assert rig.table.slope_grid() is None
     assert calibration_texts(rig, "alpha") == {}
 
 
@@ -62,9 +61,9 @@ def test_a_map_takes_the_place_of_the_slopes_sigma_and_is_part_of_the_provenance
     assert noise.slope_sigma_m_s2 == RELEVELLING_SIGMA_M_S2
     assert noise.waviness_sigma_m_s2 == pytest.approx(1.25e-4)
     assert rig_noise(rig, "alpha").slope_sigma_m_s2 > noise.slope_sigma_m_s2
-    assert slope_grid_of(rig).at(0.5, 0.5) == pytest.approx((5e-4, -1e-3))
+    assert rig.table.slope_grid().at(0.5, 0.5) == pytest.approx((5e-4, -1e-3))
     digest, text = calibration_texts(rig, "alpha")["table.map"]
-    assert calibration_hashes(rig)["table.map"] == digest
+    assert file_hashes(rig)["table.map"] == digest
     assert text == (tmp_path / "map.toml").read_text()
 
 
@@ -99,7 +98,7 @@ def test_constants_of_files_are_weighed_against_the_rigs(tmp_path):
         ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml: cannot be read"),
         ('map = "torn.toml"', "", r"table\.map: .*torn\.toml: is not valid TOML"),
         ('map = "joint.toml"', "", r"table\.map: .*joint\.toml: key grid is missing"),
-        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration: .*nowhere\.toml: cannot be read"),
+        ("", 'calibration = ["nowhere.toml"]', r"imu\.calibration\.0: .*nowhere\.toml: cannot be read"),
         ("", 'calibration = ["rest.toml"]', r"rest\.toml holds no constant that lasts"),
         ("", 'calibration = ["unit.toml"]', r"unit\.toml: lever_x must be in the unit 'm', found 'mm'"),
     ],
@@ -109,9 +108,8 @@ def test_a_wrong_file_is_one_sentence_before_anything_starts(tmp_path, table, im
     write_constants(tmp_path / "joint.toml", gyro_scale=(4e-3, 1e-4, "1"))
     write_constants(tmp_path / "rest.toml", omega_offset=(4e-3, 1e-4, "rad/s"))
     write_constants(tmp_path / "unit.toml", lever_x=(35.0, 1.0, "mm"))
-    rig = rig_of(tmp_path, table, imu)
     with pytest.raises(RigError, match=said) as found:
-        check_rig(rig)
+        rig_of(tmp_path, table, imu)
     assert "\n" not in str(found.value)
 
 
@@ -125,5 +123,6 @@ def test_a_wrong_file_is_one_sentence_before_anything_starts(tmp_path, table, im
     ],
 )
 def test_keys_that_cannot_be_are_refused(tmp_path, table, more, said):
+    write_map(tmp_path / "m.toml")
     with pytest.raises(RigError, match=re.escape(said)):
         rig_of(tmp_path, table, more=more)

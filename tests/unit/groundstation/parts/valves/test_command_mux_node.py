@@ -1,5 +1,7 @@
 """The shell of the multiplexer: who commands the valves, told by messages alone."""
 
+import json
+
 import pytest
 
 from groundstation.control.allocation import Allocator
@@ -41,8 +43,14 @@ def state(now_ns, position=(0.0, 0.0), velocity=(0.0, 0.0)):
     return VehicleState(now_ns, "alpha", position, 0.0, velocity, 0.0, (1e-3, 1e-3, 1e-3), "flying", 1)
 
 
-def request(action, *argument):
-    return Request(0, "alpha", 1, "operator", action, argument)
+def request(action, **arguments):
+    return Request(0, "alpha", 1, "operator", action, json.dumps(arguments))
+
+
+def push(**arguments):
+    return request(
+        "push", **{"force_x_n": 0.2, "force_y_n": 0.0, "torque_nm": 0.0, "span_s": 0.3} | arguments
+    )
 
 
 def said(outputs, kind):
@@ -87,7 +95,7 @@ def test_a_vehicle_that_would_leave_the_table_is_braked_whatever_the_controller_
 
 def test_a_push_by_hand_outranks_the_controller_and_ends_by_itself(mux):
     list(mux.receive(state(0), 0))
-    (ack,) = said(mux.receive(request("push", 0.2, 0.0, 0.0, 0.3), 0), Ack)
+    (ack,) = said(mux.receive(push(), 0), Ack)
     assert ack.accepted
     sources = []
     for step in range(1, 40):
@@ -103,9 +111,9 @@ def test_a_push_by_hand_outranks_the_controller_and_ends_by_itself(mux):
 
 
 def test_a_push_without_end_is_refused(mux):
-    (ack,) = mux.receive(request("push", 0.2, 0.0, 0.0, 3600.0), 0)
+    (ack,) = mux.receive(push(span_s=3600.0), 0)
     assert not ack.accepted
-    assert "up to 10 s" in ack.reason
+    assert "span_s is 3600, expected 0 to 10" in ack.reason
 
 
 def test_a_stop_closes_until_it_is_released(mux):
