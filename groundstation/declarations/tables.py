@@ -1,5 +1,6 @@
 """The tables of the whole system: the concatenation of what the parts declare, each name once."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
@@ -38,7 +39,10 @@ class Tables:
 
     def __init__(self, parts: Iterable[Part], topics: Iterable[type[Message]] = ()) -> None:
         listed = tuple(parts)
-        self.parts: Mapping[str, Part] = _by_name("part", ((part.name, part, part) for part in listed))
+        self.parts: Mapping[str, Part] = {part.name: part for part in listed}
+        for name, count in Counter(part.name for part in listed).items():
+            if count > 1:
+                raise PartError(f"{count} parts are named {name!r}")
         own = ((kind.TOPIC.noun, kind, None) for kind in topics)
         declared = ((kind.TOPIC.noun, kind, part) for part in listed for kind in part.topics)
         self.payloads: Mapping[str, type[Message]] = _by_name("topic", (*own, *declared))
@@ -72,7 +76,13 @@ def _by_name(what: str, rows: Iterable[tuple[str, T, Part | None]]) -> dict[str,
     owners: dict[str, Part | None] = {}
     for name, row, part in rows:
         if name in found:
-            first, second = (owner.name if owner else "of the runners" for owner in (owners[name], part))
-            raise PartError(f"the parts {first!r} and {second!r} both declare a {what} named {name!r}")
+            first, second = map(_who, (owners[name], part))
+            if owners[name] is part:
+                raise PartError(f"{first} declares {what} {name!r} twice")
+            raise PartError(f"{first} and {second} both declare {what} {name!r}")
         found[name], owners[name] = row, part
     return found
+
+
+def _who(part: Part | None) -> str:
+    return "the runners" if part is None else f"part {part.name!r}"

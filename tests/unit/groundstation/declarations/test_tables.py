@@ -65,12 +65,18 @@ SOURCE = FixSource("heart", PoseFix, lambda rig, vehicle: True, lambda rig, vehi
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ([part(), part()], "two parts declare a part named 'pulse'"),
-        ([part(topics=(Beat,)), part("b", topics=(OtherBeat,))], "two parts declare a topic named 'beat'"),
-        ([part(topics=(Beat, Beat))], "two parts declare a topic named 'beat'"),
-        ([part(nodes=(row(),)), part("b", nodes=(row(),))], "two parts declare a node named 'heart'"),
-        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "two parts declare a action named 'skip'"),
-        ([part(fix_sources=(SOURCE, SOURCE))], "two parts declare a fix source named 'heart'"),
+        ([part(), part()], "2 parts are named 'pulse'"),
+        (
+            [part(topics=(Beat,)), part("b", topics=(OtherBeat,))],
+            "part 'pulse' and part 'b' both declare topic 'beat'",
+        ),
+        ([part(topics=(Beat, Beat))], "part 'pulse' declares topic 'beat' twice"),
+        (
+            [part(nodes=(row(),)), part("b", nodes=(row(),))],
+            "part 'pulse' and part 'b' both declare node 'heart'",
+        ),
+        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "part 'pulse' declares action 'skip' twice"),
+        ([part(fix_sources=(SOURCE, SOURCE))], "part 'pulse' declares fix source 'heart' twice"),
         ([part(actions=(ACTION,))], "action 'skip' is answered by 'heart', which no part declares"),
         (
             [part(ports=(PortRow("heart", Port, lambda rig, vehicle: None),))],
@@ -85,7 +91,7 @@ def test_what_does_not_fit_is_refused_by_name(parts, sentence):
 
 
 def test_a_topic_of_the_runners_cannot_be_declared_again():
-    with pytest.raises(PartError, match="two parts declare a topic named 'beat'"):
+    with pytest.raises(PartError, match="the runners and part 'pulse' both declare topic 'beat'"):
         Tables([part(topics=(OtherBeat,))], topics=(Beat,))
 
 
