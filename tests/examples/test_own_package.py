@@ -22,11 +22,11 @@ PAGES = [
 HOLD_X_M = 0.2
 
 
-def call(*words, packages):
-    """``groundstation`` with packages installed; the finished process."""
+def call(*words, packages, module="groundstation"):
+    """A module, usually ``groundstation``, with packages installed; the finished process."""
     path = os.pathsep.join([*map(str, packages), os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
     return subprocess.run(
-        [sys.executable, "-m", "groundstation", *map(str, words)],
+        [sys.executable, "-m", module, *map(str, words)],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
         capture_output=True,
@@ -199,6 +199,18 @@ def test_a_package_that_cannot_be_imported_is_named_in_one_sentence(gremlin, tmp
     assert len(done.stderr.splitlines()) == 1
     assert "gremlin-sensor" in done.stderr
     assert "RuntimeError: the gremlin woke up" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_contract_tests_find_the_rows_of_the_package(own_package):
+    done = call(
+        *("-q", "-n", "0", "tests/contract/test_topics.py"),
+        *("tests/unit/groundstation/control/test_control_contract.py", "-k", "range or spring"),
+        packages=[own_package],
+        module="pytest",
+    )
+    assert done.returncode == 0, done.stdout
+    assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= 15
 
 
 def lines_of(protocol):

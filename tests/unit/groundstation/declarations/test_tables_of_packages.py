@@ -47,13 +47,13 @@ def test_parts_add_up():
 @pytest.mark.parametrize(
     ("one", "two", "complaint"),
     [
-        ({"topics": (Rain,)}, {"topics": (OtherRain,)}, "'one' and 'two' both declare a topic named 'rain'"),
+        ({"topics": (Rain,)}, {"topics": (OtherRain,)}, "'one' and part 'two' both declare topic 'rain'"),
         (
             {"nodes": (row("eye"),)},
             {"nodes": (row("eye"),)},
-            "'one' and 'two' both declare a node named 'eye'",
+            "'one' and part 'two' both declare node 'eye'",
         ),
-        ({"topics": (RivalOfTheJournal,)}, {}, "'of the runners' and 'one' both declare a topic"),
+        ({"topics": (RivalOfTheJournal,)}, {}, "the runners and part 'one' both declare topic"),
         (
             {},
             {"ports": (PortRow("nobody", Port, lambda rig, vehicle: None),)},
@@ -68,5 +68,5 @@ def test_parts_that_contradict_each_other_are_refused_by_name(one, two, complain
 
 
 def test_two_parts_of_one_name_are_refused():
-    with pytest.raises(PartError, match="both declare a part named 'one'"):
+    with pytest.raises(PartError, match="2 parts are named 'one'"):
         Tables([Part("one", ""), Part("one", "")])
