@@ -19,9 +19,10 @@ from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
 from groundstation.declarations.vehicle_type import ValvesSection, VehicleType
+from groundstation.files.errors import FileError
 from groundstation.fusion.levelling import levelling
 from groundstation.fusion.slope_grid import SlopeGrid, slope_grid
-from groundstation.fusion.table_map import TableMap, TableMapError
+from groundstation.fusion.table_map import TableMap
 
 if TYPE_CHECKING:
     from groundstation.declarations.tables import Tables
@@ -79,7 +80,7 @@ class TableSection(Section):
             return None
         try:
             return slope_grid(self.map.value(TableMap.parse))
-        except TableMapError as error:
+        except FileError as error:
             raise ValueError(f"table.map: {error}") from error
 
     def keep_in(self) -> KeepIn:

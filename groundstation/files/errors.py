@@ -3,6 +3,3 @@
 
 class FileError(ValueError):
     """A file is missing, torn or says something impossible; the message is one sentence naming it."""
-
-
-CalibrationFileError = FileError

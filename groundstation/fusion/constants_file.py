@@ -33,8 +33,6 @@ UNITS: Mapping[str, str] = {
 """What lasts from one run to the next, with the unit that a file must give it in."""
 
 
-ConstantsError = FileError
-
 Constants = dict[str, tuple[float, float]]
 """Value and sigma by name."""
 

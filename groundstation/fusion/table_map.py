@@ -26,9 +26,6 @@ G_M_S2 = 9.80665
 _ARRAYS = ("ax_m_s2", "ay_m_s2", "std_x_m_s2", "std_y_m_s2", "height_m")
 
 
-TableMapError = FileError
-
-
 @dataclass(frozen=True, slots=True)
 class MapProvenance:
     """Where a map comes from."""

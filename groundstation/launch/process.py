@@ -12,7 +12,7 @@ from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError, UsageError
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.launch.child import REFUSAL
 from groundstation.launch.orders import Go, Orders
 from groundstation.recording.policy import ImagePolicy
@@ -46,7 +46,7 @@ def obey(work: Callable[[Orders], None], orders: Orders) -> None:
     code = 0
     try:
         work(orders)
-    except (UsageError, CalibrationFileError, DeviceError) as error:
+    except (UsageError, FileError, DeviceError) as error:
         code = _end_with(error, REFUSAL)
     except GroundStationError as error:
         code = _end_with(error, TROUBLE)

@@ -17,7 +17,7 @@ from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.tables import Tables
-from groundstation.files.errors import CalibrationFileError
+from groundstation.files.errors import FileError
 from groundstation.parts.table import installed_tables
 from groundstation.rig.compose import rig_model
 from groundstation.rig.plan import check_plan
@@ -101,7 +101,7 @@ def build_rig(
         for part in model.tables.parts.values():
             part.check(rig)
         check_plan(rig)
-    except CalibrationFileError as error:
+    except FileError as error:
         raise RigError(str(error)) from error
     except ValidationError as error:
         raise RigError(f"{path}: {_first_sentence(error)}") from error
@@ -172,14 +172,14 @@ class _Reader:
         name = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
         if self._given is not None:
             if name not in self._given:
-                raise CalibrationFileError(f"{path}: was not among the files of the run.")
+                raise FileError(f"{path}: was not among the files of the run.")
             return self._given[name]
         if name in self._known:
             return self._known[name]
         try:
             return path.read_bytes()
         except OSError as error:
-            raise CalibrationFileError(f"{path}: cannot be read ({error.strerror or error}).") from error
+            raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
 
 
 def bytes_of(rig: Rig) -> dict[str, bytes]:

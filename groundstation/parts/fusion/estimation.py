@@ -9,8 +9,9 @@ from dataclasses import replace
 from groundstation.declarations.fix import Floor
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.rig_file import RigFile
+from groundstation.files.errors import FileError
 from groundstation.fusion.constants import noise_with_constants
-from groundstation.fusion.constants_file import ConstantsError, parse_constants, surest
+from groundstation.fusion.constants_file import parse_constants, surest
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
 from groundstation.fusion.slope_grid import noise_with
 from groundstation.parts.fusion.sections import FusionOfVehicle
@@ -69,7 +70,7 @@ def rig_noise(rig: Rig, vehicle: str) -> NoiseModel:
         return noise
     try:
         found = surest(file.value(parse_constants) for file in imu.calibration)
-    except ConstantsError as error:
+    except FileError as error:
         raise ValueError(f"mock_ups.{rig.vehicles[vehicle].mock_up}.imu.calibration: {error}") from error
     return noise_with_constants(noise, found)
 

@@ -29,7 +29,7 @@ class OverheadTracker(Node):
         delay: From the middle of the exposure to a picture's stamp.
 
     Raises:
-        CalibrationFileError: A file is missing or wrong.
+        FileError: A file is missing or wrong.
     """
 
     inputs = (OverheadImage,)

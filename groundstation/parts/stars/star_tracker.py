@@ -43,7 +43,7 @@ class StarTracker(Node):
         settings: Of the search, exposure and shutter included.
 
     Raises:
-        CalibrationFileError: A file is missing or wrong.
+        FileError: A file is missing or wrong.
     """
 
     inputs = (StarSpots, VehicleState, Request)

@@ -8,9 +8,8 @@ import pytest
 from calibration.flights import opened, read_flight
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.parts.fusion.estimation import fix_floor_of
 from groundstation.parts.stars.messages import StarFix
-from groundstation.rig.read import load_rig
+from groundstation.rig.read import load_rig, read_text
 
 RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 
@@ -19,15 +18,15 @@ RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("flights") / "run.mcap"
     rig_path = RIGS / "drawn_fixes.toml"
-    run_lockstep(load_rig(rig_path), rig_path, path, 12.0, 3, lambda *_: None)
+    run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, 12.0, 3, lambda *_: None)
     return path
 
 
 def test_each_fix_of_a_recording_has_its_own_covariance_and_the_rigs_floor(recording):
     data = read_flight(recording)
     with opened(recording) as (file, rig):
-        floor_m, floor_rad = fix_floor_of(rig, "alpha")
-        fixes = [message.payload for message in file.messages((StarFix.TOPIC,), ("alpha",))]
+        floor_m, floor_rad = rig.tables.fix_sources["stars"].floor(rig, "alpha")
+        fixes = [message.payload for message in file.messages((StarFix,), ("alpha",))]
     own = np.array([fix.covariance for fix in fixes if fix.fix]).reshape(-1, 3, 3)
     assert len(own) >= 5
     np.testing.assert_allclose(

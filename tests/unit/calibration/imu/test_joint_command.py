@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.fusion.table_map import TableMap
 from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.rig.read import load_rig
+from groundstation.rig.read import load_rig, read_text
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 TILT = (0.0003, -0.0001)
@@ -24,7 +24,7 @@ def test_a_recording_gives_constants_and_slope_map_with_sigmas(tmp_path, grounds
         .replace("rate_hz = 1.5", "rate_hz = 5.0")
         .replace("delay_s = 0.6", "delay_s = 0.1")
     )
-    run_lockstep(load_rig(rig_path), rig_path, path, 45.0, 4, lambda *_: None)
+    run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, 45.0, 4, lambda *_: None)
     out, table_map, plot = (tmp_path / name for name in ("joint.toml", "map.toml", "joint.png"))
     words = ("calibrate", "joint", path, "--out", out, "--table-map", table_map, "--plot", plot)
     result = groundstation(*words)

@@ -9,7 +9,7 @@ from groundstation.declarations.errors import UsageError
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.fusion.estimation import rig_noise
 from groundstation.recording.errors import RecordingError
-from groundstation.rig.read import load_rig
+from groundstation.rig.read import load_rig, read_text
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 SCALE = (0.02, -0.03)
@@ -31,7 +31,7 @@ def record(folder, name, tilt_rad, heading_deg=5.0, seconds=5.0):
         text = text.replace(old, new)
     rig_path, path = folder / f"{name}.toml", folder / f"{name}.mcap"
     rig_path.write_text(text)
-    run_lockstep(load_rig(rig_path), rig_path, path, seconds, 7, lambda *_: None)
+    run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, seconds, 7, lambda *_: None)
     return path
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from groundstation.runtime import factories
-from groundstation.runtime.ports import ports_of
 
 from calibration.result import provenance_of
 from calibration.sky.delay import delay_from_headings
 from groundstation.files.errors import FileError
+from groundstation.parts.stars.sections import StarsOfType
+from groundstation.rig.plan import make_node
 from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 
@@ -58,15 +58,12 @@ def test_the_rig_hands_the_measured_delay_to_the_stamps_and_its_spread_to_fusion
     rig = parse_rig(text, delay_file.with_name("rig.toml"))
     delay, jitter = measured.quantities["delay"], measured.quantities["jitter"]
     sigma_s = math.hypot(delay.std, jitter.value)
-    camera = rig.mock_ups["standard"].star_camera
-    assert camera.delay_s == pytest.approx(delay.value, rel=1e-6)
-    assert camera.delay_sigma_s == pytest.approx(sigma_s, rel=1e-6)
-    port = next(port for port in ports_of(rig) if port.channel.endswith("star_camera"))
-    assert port.delay.delay_s == camera.delay_s
-    fusion = factories.fusion(rig, "alpha")
-    assert fusion._estimator.noise.fix_delay_sigma_s == camera.delay_sigma_s
-    tracker = factories.star_tracker(rig, "alpha")
-    assert tracker._stamp_sigma_s == camera.delay_sigma_s
+    camera = rig.of_type("alpha", StarsOfType).star_camera
+    assert camera.delay == pytest.approx((delay.value, sigma_s), rel=1e-6)
+    fusion = make_node(rig, "alpha/fusion")
+    assert fusion._estimator.noise.fix_delay_sigma_s == camera.delay[1]
+    tracker = make_node(rig, "alpha/star_tracker")
+    assert (tracker._delay.delay_s, tracker._delay.delay_std_s) == camera.delay
 
 
 @pytest.mark.parametrize(
