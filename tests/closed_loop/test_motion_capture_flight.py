@@ -1,4 +1,4 @@
-"""A mock-up flies on motion capture alone: the frame, the pivot and the delay of the rig are those of the system."""
+"""A mock-up flies on motion capture alone: frame, pivot and delay of the rig are those of the system."""
 
 import math
 

@@ -92,7 +92,8 @@ def _check(rig: Rig) -> None:
     if isinstance(system.address, str):
         if not system.address.startswith(LABORATORY):
             raise ValueError(
-                f"motion_capture.address: expected a table with 'system' and 'hostname', found {system.address!r}"
+                "motion_capture.address: expected a table with 'system' and 'hostname', "
+                f"found {system.address!r}"
             )
         check_address(rig, "motion_capture.address", system.address)
     names = _names(rig)

@@ -33,7 +33,7 @@ class MotionCaptureOfRig(Section):
 
 
 class CapturedBodySection(Section):
-    """A vehicle's rigid body: its name in the system, where its pivot sits, and whether it is the reference."""
+    """A vehicle's rigid body: its name in the system, where its pivot sits, whether it is the reference."""
 
     body: str | None = None
     pivot_body_m: tuple[float, float] = (0.0, 0.0)

@@ -71,8 +71,14 @@ SOURCE = FixSource("heart", PoseFix, lambda rig, vehicle: True, lambda rig, vehi
             "the parts 'pulse' and 'b' both declare the topic 'beat'",
         ),
         ([part(topics=(Beat, Beat))], "the part 'pulse' declares the topic 'beat' twice"),
-        ([part(nodes=(row(),)), part("b", nodes=(row(),))], "the parts 'pulse' and 'b' both declare the node 'heart'"),
-        ([part(nodes=(row(),), actions=(ACTION, ACTION))], "the part 'pulse' declares the action 'skip' twice"),
+        (
+            [part(nodes=(row(),)), part("b", nodes=(row(),))],
+            "the parts 'pulse' and 'b' both declare the node 'heart'",
+        ),
+        (
+            [part(nodes=(row(),), actions=(ACTION, ACTION))],
+            "the part 'pulse' declares the action 'skip' twice",
+        ),
         ([part(fix_sources=(SOURCE, SOURCE))], "the part 'pulse' declares the fix source 'heart' twice"),
         ([part(actions=(ACTION,))], "action 'skip' is answered by 'heart', which no part declares"),
         (
