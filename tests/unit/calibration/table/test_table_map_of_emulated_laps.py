@@ -12,7 +12,6 @@ from calibration.table.prediction import check_outages
 from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import fit_surface
 from drivers.laboratory import load_laboratory
-from firmware_emulator.plant.air_table import Surface
 from groundstation.cli.table_map_flights import read_source
 from groundstation.recording.writer import Recorder
 from groundstation.runtime.provenance import recording_info
@@ -34,10 +33,7 @@ def survey_laps(monkeypatch):
 
 def true_surface(rig):
     """The surface that the laboratory draws from this seed."""
-    laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, SEED)
-    table = laboratory.config.table
-    rng = np.random.default_rng(laboratory._seeds(0, 0, 0))
-    surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
+    surface = load_laboratory(rig.laboratory.name, rig.laboratory.table, SEED).surface
     return lambda places: np.array([surface.slope_acceleration(x, y) for x, y in places.tolist()])
 
 
