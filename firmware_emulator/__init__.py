@@ -9,7 +9,7 @@ It shares codecs with the drivers, and no mathematics with the ground station.
 
 `laboratory.EmulatedLaboratory` runs in virtual time, `python -m firmware_emulator RIG.toml` in real time. The
 scenario is the rig's `[laboratory]` table (`config`, `mock_up_config`, `failures`) with a section for each
-device; which kinds there are says `device_table`, and an installed package may bring more.
+device; `device_table` lists the kinds, and an installed package may bring more.
 
 Not modelled: the IMU block's firmware instruction by instruction, and with it the moments of the single SPI
 transfers within a poll (0.4 ms); vertical shocks, which would show in X + Y of the inclinometers; vehicles

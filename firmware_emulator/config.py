@@ -1,4 +1,4 @@
-"""The scenario of an emulated laboratory, as the rig's `[laboratory]` table says it.
+"""The scenario of an emulated laboratory, as the rig's `[laboratory]` table states it.
 
 The rig file speaks degrees where people do (`_deg` in the key); everything past this file is SI and
 radians. Unknown keys are refused.

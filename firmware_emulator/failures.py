@@ -49,12 +49,12 @@ class FailureKind:
     Attributes:
         device: Whom it befalls: `serial`, `imu`, `camera`, `sky` (rendered pictures only),
             `overhead`, `valves`.
-        says: What happens.
+        effect: What happens, in a sentence.
         parameters: By name; a scenario or an order may give these and no others.
     """
 
     device: str
-    says: str
+    effect: str
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
 
 

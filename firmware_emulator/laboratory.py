@@ -13,7 +13,7 @@ from typing import Any
 from drivers.laboratory import Arrival, CameraFrame, ChannelKind
 from firmware_emulator.device_kind import Camera, Device, DeviceKind, PictureOrder, Receiver, Renderer, Runner
 from firmware_emulator.device_table import device_kinds, failure_kinds, read_config
-from firmware_emulator.mock_up import build_mock_ups
+from firmware_emulator.mock_up import build_mock_ups, build_table
 from firmware_emulator.plant.contacts import Contacts, ContactWatch
 from firmware_emulator.scenario import MockUp, Scenario, Site
 
@@ -24,7 +24,7 @@ class Installed:
 
     Attributes:
         kind: Its row of the table.
-        channel: Where it is heard.
+        channel: Where what it sends arrives.
         device: The thing itself.
         settings: What it was built from.
         order: Who draws its pictures, if it is a camera.
@@ -49,6 +49,8 @@ class EmulatedLaboratory:
         is_rendering: False leaves pictures to whoever calls `take_exposures`.
 
     Attributes:
+        config: The `[laboratory]` table as read.
+        surface: The truth about the table's slope.
         mock_ups: The vehicles on the table.
         installed: Their devices and those that they share, in the order in which arrivals of one stamp come.
 
@@ -67,7 +69,9 @@ class EmulatedLaboratory:
         is_rendering: bool = True,
     ) -> None:
         scenario = Scenario(read_config(config), seed, start_ns)
-        self.mock_ups: tuple[MockUp, ...] = build_mock_ups(scenario)
+        self.config = scenario.config
+        self.surface, floor = build_table(scenario)
+        self.mock_ups: tuple[MockUp, ...] = build_mock_ups(scenario, self.surface, floor)
         site = Site(scenario, self.mock_ups, failure_kinds(device_kinds()))
         self.installed = tuple(_install(site, is_rendering))
         self._by_channel = {row.channel: row for row in self.installed}

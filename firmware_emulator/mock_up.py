@@ -19,12 +19,16 @@ from firmware_emulator.scenario import MockUp, Scenario
 _CLOCK_PPM = 50.0  # tolerance of a cheap crystal
 
 
-def build_mock_ups(scenario: Scenario) -> tuple[MockUp, ...]:
-    """Put every mock-up of a scenario on the table that they share."""
+def build_table(scenario: Scenario) -> tuple[Surface, FloorPulses]:
+    """The surface that all mock-ups share, and the shocks of the floor under it."""
     table = scenario.config.table
     rng = scenario.random("surface")
     surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
-    floor = FloorPulses(table.floor_pulse_rate_hz, table.floor_pulse_m_s2, table.floor_pulse_s, rng)
+    return surface, FloorPulses(table.floor_pulse_rate_hz, table.floor_pulse_m_s2, table.floor_pulse_s, rng)
+
+
+def build_mock_ups(scenario: Scenario, surface: Surface, floor: FloorPulses) -> tuple[MockUp, ...]:
+    """Put every mock-up of a scenario on the table."""
     return tuple(
         _build_mock_up(scenario, index, surface, floor) for index in range(len(scenario.config.vehicles))
     )

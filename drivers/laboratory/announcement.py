@@ -1,4 +1,4 @@
-"""The line by which a laboratory that was started says where its channels can be opened."""
+"""The line by which a started laboratory announces where its channels can be opened."""
 
 import json
 from collections.abc import Mapping

@@ -91,7 +91,7 @@ def encode_order(order: InjectOrder) -> bytes:
 
 
 def parse_event(line: str | bytes) -> FailureEvent | FailureRefused:
-    """What a line of the laboratory says.
+    """The event in a line of the laboratory.
 
     Raises:
         ValueError: The line is no event; the message says why in one sentence.

@@ -1,4 +1,4 @@
-"""What the reader process says to its parent, one JSON object a line. Pure.
+"""What the reader process sends to its parent, one JSON object a line. Pure.
 
 `{"ready": true}` once the system has answered; then per frame `{"stamp_ns": …, "bodies": {"name": [x, y, z,
 qx, qy, qz, qw], …}}`; or `{"error": "sentence"}`, after which it ends.

@@ -62,7 +62,7 @@ class FailureDesk:
         return take_until(self._pending, until_ns)
 
     def receive(self, stamp_ns: int, data: InjectOrder) -> None:
-        """Let a failure begin at `stamp_ns`, or say why not."""
+        """Let a failure begin at `stamp_ns`, or refuse with the reason."""
         try:
             if data.vehicle not in self._failures:
                 known = ", ".join(self._failures)

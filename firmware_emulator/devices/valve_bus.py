@@ -21,7 +21,7 @@ _SHORTEST_BYTES = 6  # status and pressure, the shortest that nodes send
 class ValveBus:
     """Carries frames between the host and the nodes.
 
-    A node's frame reaches the host alone, since nodes have nothing to say to each other.
+    A node's frame reaches the host alone, since nodes do not talk to each other.
 
     Args:
         nodes: All nodes.

@@ -1,4 +1,4 @@
-"""The CAN node of one vehicle: commands to coil currents, and what it says about itself.
+"""The CAN node of one vehicle: commands to coil currents, and what it reports about itself.
 
 A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man, silence
 of 100 ms closes all, a stop closes all and disarms (`docs/interfaces/valve_bus.md`).
@@ -68,7 +68,7 @@ class ValveNode:
         self._minimum_on_ms, self._float_delay_s = minimum_on_ms, float_delay_s
         self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._inbox: deque[tuple[int, CanFrame]] = deque()
-        self.outbox: list[CanFrame] = []  # what it wants to say now
+        self.outbox: list[CanFrame] = []  # what it sends now
         # Fifty times a second, and nearly always one of the sixteen counters with nothing else new.
         self._encode_status: Callable[[ValveStatus], CanFrame] = lru_cache(256)(encode)
         self._off_ns: dict[int, int] = {}  # energised valves and when their time is up
@@ -95,7 +95,7 @@ class ValveNode:
 
     @property
     def next_output_ns(self) -> int:
-        """When it next says something."""
+        """When it next sends something."""
         return min(self._status_ns, self._slow_ns)
 
     @property
@@ -108,7 +108,7 @@ class ValveNode:
         self._inbox.append((stamp_ns, frame))
 
     def run(self, now_ns: int) -> None:
-        """Do what is due at `now_ns`: time-outs first, then what was heard, then speak."""
+        """Do what is due at `now_ns`: time-outs first, then what was received, then send."""
         for valve in [valve for valve, off_ns in self._off_ns.items() if off_ns <= now_ns]:
             self._close([valve], now_ns)
         if self._dead_man_ns <= now_ns:
@@ -119,10 +119,10 @@ class ValveNode:
         while self._inbox and self._inbox[0][0] <= now_ns:
             _, frame = self._inbox.popleft()
             if not is_silent:
-                self._hear(frame, now_ns)
-        self._speak(now_ns, is_silent)
+                self._obey(frame, now_ns)
+        self._send_due(now_ns, is_silent)
 
-    def _hear(self, frame: CanFrame, now_ns: int) -> None:
+    def _obey(self, frame: CanFrame, now_ns: int) -> None:
         message = decode(frame)
         match message:
             case ValveCommand(vehicle=self._index):
@@ -188,7 +188,7 @@ class ValveNode:
             },
         )
 
-    def _speak(self, now_ns: int, is_silent: bool) -> None:
+    def _send_due(self, now_ns: int, is_silent: bool) -> None:
         if self._status_ns <= now_ns:
             self._status_ns += STATUS_NS
             self._status_counter = (self._status_counter + 1) & 0xF

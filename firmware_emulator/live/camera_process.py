@@ -1,8 +1,8 @@
 """Draws the pictures of all cameras and serves them over HTTP, in a process of its own.
 
 Drawing takes milliseconds of CPU; in the process that paces the serial lines it would delay bytes. The
-parent says on stdin, one JSON line each, first what cameras there are, then every exposure; end of file
-ends this process. On stdout it says its port once.
+parent writes on stdin, one JSON line each, first what cameras there are, then every exposure; end of file
+ends this process. On stdout it reports its port once.
 """
 
 import json
@@ -26,7 +26,7 @@ from firmware_emulator.sky.scene import SceneError
 BOUNDARY = "picture"
 NS_PER_S = 1_000_000_000
 NICENESS = 10
-"""On a busy machine bytes, filters and valves go first; a late picture still says when it was taken."""
+"""On a busy machine bytes, filters and valves go first; a late picture still carries its stamp."""
 _MAX_ORDERS = 64  # more than a second of the slowest pipeline; behind that, old pictures give way to new ones
 
 
@@ -157,6 +157,6 @@ def main(port: int) -> int:
 if __name__ == "__main__":
     try:
         status = main(int(sys.argv[1]))
-    except BrokenPipeError:  # the parent ended before it heard our port
+    except BrokenPipeError:  # the parent ended before it read our port
         status = 0
     os._exit(status)  # threads that wait for slow clients must not hold the process

@@ -32,7 +32,7 @@ class FailureServed:
         return self._server.dropped_messages
 
     def send(self, data: FailureEvent | FailureRefused) -> None:
-        """Tell every client."""
+        """Send an event to every client."""
         if isinstance(data, FailureEvent):
             self._remember(data)
         self._server.broadcast(encode_event(data))

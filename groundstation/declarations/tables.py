@@ -78,9 +78,13 @@ def _by_name(what: str, rows: Iterable[tuple[str, T, Part | None]]) -> dict[str,
 
 
 def _complaint(what: str, name: str, first: Part | None, second: Part | None) -> str:
+    part = first or second
+    if part is None:
+        return f"the runners declare the {what} {name!r} twice"
     if first is None or second is None:
-        part = first or second
-        return f"the part {'' if part is None else part.name!r} declares the {what} {name!r}, which is the runners' own"
+        return f"the part {part.name!r} declares the {what} {name!r}, which is the runners' own"
     if first is second:
-        return f"the part {first.name!r} declares the {what} {name!r} twice"
+        return f"the part {part.name!r} declares the {what} {name!r} twice"
+    if what == "part":
+        return f"two parts are named {name!r}"
     return f"the parts {first.name!r} and {second.name!r} both declare the {what} {name!r}"

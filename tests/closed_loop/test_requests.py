@@ -24,14 +24,20 @@ def ask(flight, action, request_id=7, **arguments):
 @pytest.mark.parametrize("action", [name for name in ACTIONS if name != "picture"])
 def test_a_known_request_is_answered_once(fly, action):
     flight = fly().run(2.5)
-    answers = ask(flight, action, **{argument.name: 0.1 for argument in ACTIONS[action].arguments})
+    values = {float: 0.1, str: "stuck_gyro"}
+    arguments = {
+        argument.name: values[argument.kind]
+        for argument in ACTIONS[action].arguments
+        if argument.default is None
+    }
+    answers = ask(flight, action, **arguments)
     assert [(ack.action, ack.accepted, ack.vehicle) for ack in answers] == [(action, True, "alpha")]
 
 
 @pytest.mark.parametrize(
     ("action", "arguments", "reason"),
     [
-        ("picture", {}, "there is no star camera"),  # its fixes are drawn
+        ("picture", {}, "this vehicle has no star tracker"),  # its fixes are drawn
         ("fire", {}, "unknown action 'fire'"),
         ("go_to", {"x_m": 0.1, "y_m": 0.2}, "go_to needs heading_rad"),
         ("go_to", {"x_m": math.nan, "y_m": 0.0, "heading_rad": 0.0}, "finite"),

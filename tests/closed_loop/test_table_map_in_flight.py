@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from drivers.laboratory import load_laboratory
-from firmware_emulator.plant.air_table import Surface
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionCalibration, FusionStatus, VehicleState
@@ -27,10 +26,7 @@ POSES = ((1.0, -0.6, 0.8), (-1.0, -0.6, 1.6), (1.0, 0.7, 2.4), (-0.9, 0.8, 3.0))
 
 def true_map(rig, seed, path):
     """Write the map that a perfect survey of the emulated table would have made."""
-    laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed)
-    table = laboratory.config.table
-    rng = np.random.default_rng(laboratory._seeds(0, 0, 0))
-    surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
+    surface = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed).surface
     x, y = np.arange(-2.0, 2.01, 0.05), np.arange(-1.5, 1.51, 0.05)
     pull = np.array([[surface.slope_acceleration(a, b) for a in x] for b in y])
     std, mean = np.full(pull.shape[:2], 5e-5), pull.reshape(-1, 2).mean(axis=0)

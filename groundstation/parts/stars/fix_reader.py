@@ -5,9 +5,7 @@ from collections.abc import Iterator
 from drivers.reference.protocol import PoseParser
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, Request, answer
 from groundstation.frames import wrap_angle
-from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.messages import FixBytes, StarFix
 
 
@@ -19,8 +17,8 @@ class FixReader(Node):
         stamp_sigma_s: Standard deviation of the stream's ages.
     """
 
-    inputs = (FixBytes, Request)
-    outputs = (StarFix, Ack)
+    inputs = (FixBytes,)
+    outputs = (StarFix,)
 
     def __init__(self, vehicle: str, stamp_sigma_s: float) -> None:
         super().__init__(vehicle)
@@ -28,10 +26,6 @@ class FixReader(Node):
         self._stamp_sigma_s = stamp_sigma_s
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
-        if isinstance(message, Request):
-            if message.action == PICTURE.name:
-                yield answer(message, now_ns, "its fixes come from a stream: there is no star camera")
-            return
         assert isinstance(message, FixBytes)
         for pose in self._parser.feed(message.data):
             yield StarFix(

@@ -1,6 +1,6 @@
 """Guard: the shell around the one gate before the valves (``drivers.valve_bus.guard``)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 
 from drivers.valve_bus.guard import Guard as Gate
@@ -25,16 +25,18 @@ class Guard(Node):
         vehicle: Its name.
         gate: The gate before its valves.
         known: Names of all actions; it refuses what none of them is.
+        absent: Those of them that no node answers here, and why; it refuses these, too.
     """
 
     inputs = (ValveSelection, Request)
     outputs = (ValveCommand, VehicleMode, Ack, Diagnostics)
     trigger = ValveSelection
 
-    def __init__(self, vehicle: str, gate: Gate, known: frozenset[str]) -> None:
+    def __init__(self, vehicle: str, gate: Gate, known: frozenset[str], absent: Mapping[str, str]) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._gate = gate
         self._known = known
+        self._absent = absent
         self._ticks = 0
 
     def start(self, now_ns: int) -> Iterator[Message]:
@@ -48,7 +50,7 @@ class Guard(Node):
                 )
                 if self._gate.update(now_ns, command) is Verdict.NEW_PULSE:
                     yield self._output(now_ns)
-            case Request() if message.action in GUARD or message.action not in self._known:
+            case Request() if self._answers(message.action):
                 reason = self._carry_out(message, now_ns)
                 yield answer(message, now_ns, reason)
                 if not reason:
@@ -68,8 +70,13 @@ class Guard(Node):
         self._gate.stop(now_ns, StopReason.SHUTDOWN)
         yield self._output(now_ns)
 
+    def _answers(self, action: str) -> bool:
+        return action in GUARD or action in self._absent or action not in self._known
+
     def _carry_out(self, request: Request, now_ns: int) -> str:
         """Do what was asked; the reason if it cannot be done."""
+        if request.action in self._absent:
+            return self._absent[request.action]
         if request.action not in GUARD:
             return f"unknown action '{request.action}' (known: {', '.join(sorted(self._known))})"
         try:

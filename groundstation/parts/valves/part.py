@@ -52,8 +52,12 @@ def _guard(rig: Rig, vehicle: str) -> Node:
     limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
     gate = Gate(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
     nodes = rig.tables.nodes
-    known = (row.name for row in rig.tables.actions.values() if nodes[row.answered_by].vehicles(rig))
-    return Guard(vehicle, gate, frozenset(known))
+    absent = {
+        row.name: f"this vehicle has no {row.answered_by.replace('_', ' ')}"
+        for row in rig.tables.actions.values()
+        if not {vehicle, ""} & set(nodes[row.answered_by].vehicles(rig))
+    }
+    return Guard(vehicle, gate, frozenset(rig.tables.actions), absent)
 
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:

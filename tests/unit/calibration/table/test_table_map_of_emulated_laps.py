@@ -12,7 +12,6 @@ from calibration.table.smoothed_flights import read_source
 from calibration.table.surface_basis import SurfaceBasis
 from calibration.table.surface_fit import fit_surface
 from drivers.laboratory import load_laboratory
-from firmware_emulator.plant.air_table import Surface
 from groundstation.rig.read import load_rig
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
@@ -33,10 +32,7 @@ def fly_laps(monkeypatch):
 
 def true_surface(rig):
     """The surface that the laboratory draws from this seed."""
-    laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, SEED)
-    table = laboratory.config.table
-    rng = np.random.default_rng(laboratory._seeds(0, 0, 0))
-    surface = Surface(table.tilt_rad, table.waviness_rad, table.waviness_length_m, rng)
+    surface = load_laboratory(rig.laboratory.name, rig.laboratory.table, SEED).surface
     return lambda places: np.array([surface.slope_acceleration(x, y) for x, y in places.tolist()])
 
 

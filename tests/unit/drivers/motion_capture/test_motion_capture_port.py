@@ -155,5 +155,6 @@ def test_a_closed_port_ends_its_process_and_its_readers():
 def test_a_reader_that_is_stuck_is_killed():
     port = MotionCapturePort(config([{"a": 1.0}]))
     os.kill(port._child.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, port._child.pid, os.WSTOPPED | os.WNOWAIT)
     port.close()
     assert port._child.returncode == -signal.SIGKILL

@@ -65,7 +65,7 @@ SOURCE = FixSource("heart", PoseFix, lambda rig, vehicle: True, lambda rig, vehi
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ([part(), part()], "the parts 'pulse' and 'pulse' both declare the part 'pulse'"),
+        ([part(), part()], "two parts are named 'pulse'"),
         (
             [part(topics=(Beat,)), part("b", topics=(OtherBeat,))],
             "the parts 'pulse' and 'b' both declare the topic 'beat'",

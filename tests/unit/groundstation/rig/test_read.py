@@ -101,13 +101,14 @@ def test_what_flies_is_what_was_handed_over_even_where_the_file_has_changed_sinc
         parse_rig(text, path)  # from the disk
 
 
-def test_only_a_file_that_was_not_handed_over_is_taken_from_the_disk(reads):
+def test_a_file_that_was_not_handed_over_is_not_taken_from_the_disk(reads):
     given = bytes_of(load_rig(STARS))
     missing = next(name for name in given if name.endswith("/camera.json"))
     del given[missing]
     reads.clear()
-    parse_rig(STARS.read_text(), STARS, given)
-    assert reads == [Path(missing).resolve()]
+    with pytest.raises(RigError, match=f"{KEY}: .*camera.json: was not among the files of the run"):
+        parse_rig(STARS.read_text(), STARS, given)
+    assert reads == []
 
 
 def test_a_file_that_is_not_there_is_one_sentence_with_file_and_key(tmp_path):

@@ -108,7 +108,7 @@ SECTION = RIG.read_text()[RIG.read_text().index("[overhead_camera]") : RIG.read_
         (
             '["stars", "overhead"]',
             '["ceiling"]',
-            "vehicles.alpha.fix_sources: 'ceiling' is no source of fixes (there are stars, overhead)",
+            "vehicles.alpha.fix_sources: 'ceiling' is no source of fixes (there are stars, overhead, ",
         ),
         ('star_camera = "laboratory:alpha/star_camera"\n', "", "'stars' needs 'star_camera' or 'fixes'"),
         (
