@@ -8,6 +8,7 @@ Nothing here reads a clock, so that two equal runs in virtual time give equal by
 """
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -27,6 +28,8 @@ from groundstation.recording.software import software
 
 PART_SUFFIX = ".part"
 FLUSH_PERIOD_NS = 250_000_000
+MOST_RECENT = 256
+"""Messages per topic among which one that comes again is looked for."""
 
 
 class Recorder:
@@ -61,7 +64,7 @@ class Recorder:
         self._channels: dict[tuple[type[Message], str], int | None] = {}  # by class and owner
         self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
-        self._latched: dict[tuple[str, str], tuple[int, int]] = {}
+        self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
         self._file: BinaryIO | None = _open_new(path, self.part_path)
         self._writer = McapFile(self._file, profile="ros2", library=software())
         self._writer.add_metadata(METADATA_NAME, info.to_metadata())
@@ -92,7 +95,8 @@ class Recorder:
     def record_batch(self, messages: Iterable[Recorded], payloads: Mapping[str, type[Message]]) -> int:
         """Write messages of the record stream; their log time is that of their publication.
 
-        Latched messages that are repeated for late joiners are written once.
+        A message that comes again is written once: latched ones are repeated for late joiners, and of a
+        process that died the others record what they received.
 
         Args:
             messages: Of a batch.
@@ -108,14 +112,21 @@ class Recorder:
             if kind is None:
                 unknown += 1
                 continue
-            if kind.TOPIC.latched:
-                if self._latched.get((noun, owner)) == (sequence, publish_ns):
-                    continue
-                self._latched[noun, owner] = sequence, publish_ns
+            if self._is_known(noun, owner, (publish_ns, sequence)):
+                continue
             channel = self._channel(kind, owner)
             if channel is not None:
                 self._add(channel, sequence, publish_ns, message.data, publish_ns)
         return unknown
+
+    def _is_known(self, noun: str, owner: str, place: tuple[int, int]) -> bool:
+        recent = self._recent.get((noun, owner))
+        if recent is None:
+            recent = self._recent[noun, owner] = deque(maxlen=MOST_RECENT)
+        elif place <= recent[-1] and place in recent:
+            return True
+        recent.append(place)
+        return False
 
     def tick(self, now_ns: int) -> None:
         """Time passed without a message: close the chunk if it is due. The clock is that of the log times."""

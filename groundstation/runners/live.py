@@ -26,11 +26,12 @@ from groundstation.declarations.port import Edge, Port
 from groundstation.declarations.topic import Delivery, Scope
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.recording.policy import ImagePolicy, is_kept
-from groundstation.runners.live_inbox import FromPort, Inbox
+from groundstation.runners.live_inbox import FromPort, Gone, Inbox
 from groundstation.runners.live_ports import PortThread
 from groundstation.runners.record_sender import RecordSender
 from groundstation.runners.slot import Sequences, Slot
 from groundstation.runners.step import JOURNAL_PERIOD_NS, Step
+from groundstation.runners.witness import Witness
 
 LATCH_PERIOD_NS = 1_000_000_000
 RECORD_PERIOD_NS = 20_000_000
@@ -94,6 +95,7 @@ class LiveProcess:
         self._record = RecordWriter()
         self._sender = RecordSender(bus, process)
         self._record_due_ns = 0
+        self._witness = Witness()
         self._local: deque[Delivered] = deque()
         self._held: list[tuple[int, int, Delivered | Slot]] = []
         self._held_count = 0
@@ -183,11 +185,16 @@ class LiveProcess:
                 keys.add(key_of(topic, vehicle))
         for key in sorted(keys):
             self._bus.subscribe(key, self._from_bus)
+        self._bus.watch(self._from_watch)
 
     def _from_bus(self, key: str, payload: bytes, attachment: bytes) -> None:
         kind = self._payloads.get(split_key(key)[1])
         delivery = Delivery.EVERY if kind is None else kind.TOPIC.delivery
         self._inbox.put(key, Remote(key, payload, attachment), delivery)
+
+    def _from_watch(self, process: str, is_alive: bool) -> None:
+        if not is_alive and process != self._process:
+            self._inbox.put_gone(process)
 
     def _from_port(self, port: Port, stamp_ns: int, data: object) -> None:
         self._inbox.put(port.channel, FromPort(port, stamp_ns, data), port.delivery)
@@ -202,9 +209,13 @@ class LiveProcess:
                 self._note_replaced(remote.key, taken.replaced)
                 delivered = self._decoder.decode(remote)
                 if delivered is not None and delivered.envelope.owner != self._process:
+                    if is_kept(delivered.envelope.topic, self._images):
+                        self._witness.keep(delivered.envelope, remote.payload)
                     self._step.receive(delivered, time.monotonic_ns())
             case FromPort(port, stamp_ns, data):
                 self._step.arrive(port, stamp_ns, data, time.monotonic_ns())
+            case Gone():
+                self._witness.testify(self._record)
         self._drain()
 
     def _note_replaced(self, key: str, attachments: list[bytes]) -> None:

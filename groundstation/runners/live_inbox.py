@@ -18,6 +18,12 @@ class FromPort(NamedTuple):
     data: object
 
 
+class Gone(NamedTuple):
+    """A process of the run has ended, however it ended."""
+
+    process: str
+
+
 class _Newest(NamedTuple):
     """Something under this key waits in the box of newest items."""
 
@@ -28,7 +34,7 @@ class _Newest(NamedTuple):
 class Taken:
     """One item, and the attachments of the messages from the bus that it replaced before anybody looked."""
 
-    item: Remote | FromPort
+    item: Remote | FromPort | Gone
     replaced: list[bytes] = field(default_factory=list)
 
 
@@ -36,7 +42,9 @@ class Inbox:
     """One queue in order of arrival; of topics with newest delivery it holds one item each. Thread-safe."""
 
     def __init__(self) -> None:
-        self._queue: queue.SimpleQueue[Remote | FromPort | _Newest | Exception | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Remote | FromPort | Gone | _Newest | Exception | None] = (
+            queue.SimpleQueue()
+        )
         self._newest: dict[str, Taken] = {}
         self._lock = threading.Lock()
 
@@ -55,6 +63,10 @@ class Inbox:
                 waiting.item = item
         if waiting is None:
             self._queue.put(_Newest(key))
+
+    def put_gone(self, process: str) -> None:
+        """Append the end of a process, behind what came from it."""
+        self._queue.put(Gone(process))
 
     def fail(self, error: Exception) -> None:
         """A thread met a bug: ``take`` raises it in the loop."""

@@ -284,6 +284,18 @@ def test_a_latched_message_that_a_batch_repeats_is_written_once(tmp_path):
         assert [found.envelope.sequence for found in recording.messages([SequencePhase])] == [1, 2]
 
 
+def test_what_a_witness_records_again_is_written_once_and_what_only_it_has_is_kept(tmp_path):
+    demand = Wrench(5, "alpha", *[0.0] * 6)
+    sent = [Delivered(Envelope(Wrench.TOPIC, "alpha", number, 5 * number), demand) for number in range(1, 6)]
+    reborn = Delivered(Envelope(Wrench.TOPIC, "alpha", 1, 40), demand)
+    with Recorder(tmp_path / "a.mcap", EVERYTHING) as recorder:
+        for batch in (sent[:3], sent[1:], [reborn], sent[2:]):
+            assert recorder.record_batch(batch_of(batch), PAYLOADS) == 0
+    with Recording(tmp_path / "a.mcap") as recording:
+        found = [message.envelope.publish_ns for message in recording.messages([Wrench])]
+    assert found == [5, 10, 15, 20, 25, 40]
+
+
 def test_messages_of_unknown_topics_in_a_batch_are_counted_and_not_written(tmp_path, flight):
     known = {noun: kind for noun, kind in PAYLOADS.items() if kind is not Wrench}
     wrenches = sum(isinstance(d.payload, Wrench) for d in flight)
