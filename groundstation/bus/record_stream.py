@@ -5,33 +5,21 @@ second through a hub cost far more than fifty large ones. A batch carries its ow
 point at them by index and no table of topics is needed to read it.
 
 Layout, little endian: ``magic u32 | names u32 | entries u32 | causes u32 | lengths of names u16 ...`` then
-the names, the entries (``ENTRY``), the causes (``CAUSE``) and the payloads, one after the other.
+the names, the entries (``_ENTRY``), the causes (``_CAUSE``) and the payloads, one after the other.
 """
 
 import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-
 from groundstation.bus.envelope import Cause, Envelope
 
 MAGIC = 0x31535247  # "GRS1"
 _HEAD = struct.Struct("<IIII")
-ENTRY = np.dtype(
-    [
-        ("publish_ns", "<i8"),
-        ("sequence", "<u4"),
-        ("wall_ns", "<u4"),
-        ("cpu_ns", "<u4"),
-        ("size", "<u4"),  # of the payload, bytes
-        ("noun", "<u2"),  # index in names
-        ("owner", "<u2"),
-        ("causes", "<u2"),
-        ("_pad", "<u2"),
-    ]
-)
-CAUSE = np.dtype([("noun", "<u2"), ("owner", "<u2"), ("sequence", "<u4")])
+_ENTRY = struct.Struct("<qIIIIHHHxx")
+"""publish_ns, sequence, wall_ns, cpu_ns, payload's bytes, indices of noun and owner, number of causes."""
+_CAUSE = struct.Struct("<HHI")
+"""Indices of noun and owner, sequence."""
 _LONGEST_NS = 0xFFFFFFFF
 
 
@@ -44,8 +32,8 @@ class RecordWriter:
 
     def __init__(self) -> None:
         self._names: dict[str, int] = {}
-        self._entries: list[tuple[int, int, int, int, int, int, int, int, int]] = []
-        self._causes: list[tuple[int, int, int]] = []
+        self._entries: list[bytes] = []
+        self._causes: list[bytes] = []
         self._payloads: list[bytes] = []
         self.size = 0
 
@@ -58,14 +46,14 @@ class RecordWriter:
         names = self._names
         for cause_noun, cause_owner, cause_sequence in causes:
             self._causes.append(
-                (
+                _CAUSE.pack(
                     names.setdefault(cause_noun, len(names)),
                     names.setdefault(cause_owner, len(names)),
                     cause_sequence,
                 )
             )
         self._entries.append(
-            (
+            _ENTRY.pack(
                 publish_ns,
                 sequence,
                 wall_ns if wall_ns < _LONGEST_NS else _LONGEST_NS,
@@ -74,7 +62,6 @@ class RecordWriter:
                 names.setdefault(topic.noun, len(names)),
                 names.setdefault(owner, len(names)),
                 len(causes),
-                0,
             )
         )
         self._payloads.append(encoded)
@@ -85,9 +72,7 @@ class RecordWriter:
         names = [name.encode() for name in self._names]
         head = _HEAD.pack(MAGIC, len(names), len(self._entries), len(self._causes))
         lengths = struct.pack(f"<{len(names)}H", *map(len, names))
-        entries = np.array(self._entries, dtype=ENTRY).tobytes()
-        causes = np.array(self._causes, dtype=CAUSE).tobytes()
-        packed = b"".join((head, lengths, *names, entries, causes, *self._payloads))
+        packed = b"".join((head, lengths, *names, *self._entries, *self._causes, *self._payloads))
         self._names.clear()
         self._entries.clear()
         self._causes.clear()
@@ -136,15 +121,16 @@ def read_batch(data: bytes) -> Iterator[Recorded]:
         for length in lengths:
             names.append(data[position : position + length].decode())
             position += length
-        entries = np.frombuffer(data, ENTRY, entry_count, position)
-        position += entries.nbytes
-        causes = np.frombuffer(data, CAUSE, cause_count, position).tolist()
-        position += cause_count * CAUSE.itemsize
-        rows = entries.tolist()
+        stop = position + entry_count * _ENTRY.size
+        rows = list(_ENTRY.iter_unpack(data[position:stop]))
+        position = stop + cause_count * _CAUSE.size
+        causes = list(_CAUSE.iter_unpack(data[stop:position]))
         if (
-            position + int(entries["size"].sum()) != len(data)
-            or int(entries["causes"].sum()) != cause_count
-            or any((entries[field] >= name_count).any() for field in ("noun", "owner"))
+            position + sum([row[4] for row in rows]) != len(data)
+            or sum([row[7] for row in rows]) != cause_count
+            or len(rows) != entry_count
+            or len(causes) != cause_count
+            or any(row[5] >= name_count or row[6] >= name_count for row in rows)
             or any(noun >= name_count or owner >= name_count for noun, owner, _ in causes)
         ):
             raise BatchError("a batch of the record stream is cut off")
@@ -163,7 +149,7 @@ def _messages(
     causes: list[Cause],
 ) -> Iterator[Recorded]:
     first = 0
-    for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, count, _ in rows:
+    for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, count in rows:
         last, stop = first + count, position + size
         yield Recorded(
             names[noun],

@@ -7,6 +7,8 @@ keeps the interpreter from ending.
 
 Two planes. ``<owner>/<noun>`` carries a topic at once, for the processes that wait for it and for whoever
 else subscribes to it; ``record/<process>`` carries everything that a process published, in batches.
+``<owner>/<noun>/paced`` carries the first message of each period of a topic's pace, for those who need no
+more.
 Latched topics are repeated by their publisher with the same sequence number.
 """
 
@@ -23,6 +25,7 @@ from groundstation.declarations.topic import Delivery, Topic
 RIG_OWNER = "rig"
 ALIVE = "alive"
 RECORD = "record"
+PACED = "/paced"
 LEASE_MS = 2000
 
 T = TypeVar("T")
@@ -55,14 +58,14 @@ def open_hub(endpoint: str) -> zenoh.Session:
     return zenoh.open(_config("router", listen=(endpoint,)))
 
 
-def key_of(topic: Topic, owner: str) -> str:
+def key_of(topic: Topic, owner: str, *, paced: bool = False) -> str:
     """Bus key of a topic of one owner; the owner of rig topics is written ``rig``."""
-    return f"{owner or RIG_OWNER}/{topic.noun}"
+    return f"{owner or RIG_OWNER}/{topic.noun}{PACED if paced else ''}"
 
 
 def split_key(key: str) -> tuple[str, str]:
     """Owner and noun of a key."""
-    owner, _, noun = key.rpartition("/")
+    owner, _, noun = key.removesuffix(PACED).rpartition("/")
     return ("" if owner == RIG_OWNER else owner), noun
 
 
@@ -110,13 +113,16 @@ class ZenohBus:
 
     Args:
         endpoint: Of the hub.
+        is_hub: This process is the hub; what it receives itself then passes through a thread of its own,
+            since an interpreter that is busy must not keep the hub from passing on.
 
     Raises:
-        zenoh.ZError: The hub is not there.
+        zenoh.ZError: The hub is not there; or the endpoint is taken.
     """
 
-    def __init__(self, endpoint: str) -> None:
-        self._session = zenoh.open(_config("client", connect=(endpoint,)))
+    def __init__(self, endpoint: str, *, is_hub: bool = False) -> None:
+        self._is_hub = is_hub
+        self._session = open_hub(endpoint) if is_hub else zenoh.open(_config("client", connect=(endpoint,)))
         self._publishers: list[TopicPublisher] = []
         self._record: zenoh.Publisher | None = None
         self._subscribers: list[zenoh.Subscriber[None]] = []
@@ -130,15 +136,18 @@ class ZenohBus:
     ) -> None:
         self.close()
 
-    def publisher(self, topic: Topic, owner: str, *, always: bool = False) -> TopicPublisher:
+    def publisher(
+        self, topic: Topic, owner: str, *, always: bool = False, paced: bool = False
+    ) -> TopicPublisher:
         """A publisher of a topic of an owner.
 
         Args:
             topic: The topic.
             owner: Vehicle or process, empty for the rig.
             always: Publish whether or not a subscriber has been noticed: another process waits for it.
+            paced: On the key of those who take it paced.
         """
-        made = TopicPublisher(self._session, key_of(topic, owner), topic, always=always)
+        made = TopicPublisher(self._session, key_of(topic, owner, paced=paced), topic, always=always)
         self._publishers.append(made)
         return made
 
@@ -164,7 +173,8 @@ class ZenohBus:
                 b"" if attachment is None else attachment.to_bytes(),
             )
 
-        self._subscribers.append(self._session.declare_subscriber(key_expression, _direct(take)))
+        callback = Callback(take, indirect=self._is_hub)
+        self._subscribers.append(self._session.declare_subscriber(key_expression, callback))
 
     def announce(self, process: str) -> None:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""
@@ -177,8 +187,9 @@ class ZenohBus:
             process = str(sample.key_expr).rpartition("/")[2]
             told(process, sample.kind == zenoh.SampleKind.PUT)
 
+        callback = Callback(take, indirect=self._is_hub)
         self._subscribers.append(
-            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", _direct(take), history=True)
+            self._session.liveliness().declare_subscriber(f"{ALIVE}/*", callback, history=True)
         )
 
     def close(self) -> None:

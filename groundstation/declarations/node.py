@@ -21,6 +21,8 @@ class Node(ABC):
 
     Class attributes:
         inputs: Payload classes it receives; a node may set them when it is made.
+        paced: Those of the inputs that it takes at the pace of their topic, where every message is more
+            than it needs: each one wakes its process.
         outputs: Payload classes it may publish; the runner refuses others.
         trigger: What a message that is made in a tick was made from: the newest of this input. None
             where ticks report on the node itself.
@@ -31,6 +33,7 @@ class Node(ABC):
     """
 
     inputs: tuple[type[Message], ...] = ()
+    paced: ClassVar[tuple[type[Message], ...]] = ()
     outputs: ClassVar[tuple[type[Message], ...]] = ()
     trigger: ClassVar[type[Message] | None] = None
 

@@ -55,6 +55,8 @@ class Topic:
         latched: The last value reaches late joiners.
         observers_only: Only view, recorder, report and nodes that publish for them may subscribe.
         recorded: Recording policy.
+        pace_ns: Nodes that take the topic paced receive the first message of each period of this length of
+            the publisher's clock; 0 where none may.
     """
 
     noun: str
@@ -65,3 +67,24 @@ class Topic:
     latched: bool = False
     observers_only: bool = False
     recorded: Recorded = Recorded.ALWAYS
+    pace_ns: int = 0
+
+
+class Pace:
+    """Passes the first message of each period; applied twice it passes the same ones.
+
+    Args:
+        period_ns: Length of a period; periods begin at multiples of it.
+    """
+
+    def __init__(self, period_ns: int) -> None:
+        self._period_ns = period_ns
+        self._period = -1
+
+    def passes(self, publish_ns: int) -> bool:
+        """Whether a message that was published then is the first of its period."""
+        period = publish_ns // self._period_ns
+        if period == self._period:
+            return False
+        self._period = period
+        return True

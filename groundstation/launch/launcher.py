@@ -17,7 +17,7 @@ from pathlib import Path
 import zenoh
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
-from groundstation.bus.zenoh_bus import ZenohBus, open_hub
+from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
 from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.rig import Rig
@@ -78,7 +78,6 @@ class Launcher:
         self._fork_server = ForkServer(("groundstation.launch.preload",))
         self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
-        self._hub: zenoh.Session | None = None
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
@@ -89,8 +88,7 @@ class Launcher:
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
-        self.endpoint, self._hub = _open_hub()
-        self.bus = ZenohBus(self.endpoint)
+        self.endpoint, self.bus = _open_hub()
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
 
     @property
@@ -258,17 +256,15 @@ class Launcher:
         self._fork_server.close()
         if self.bus is not None:
             self.bus.close()
-        if self._hub is not None and not self._hub.is_closed():
-            self._hub.close()
 
 
-def _open_hub() -> tuple[str, zenoh.Session]:
+def _open_hub() -> tuple[str, ZenohBus]:
     """The hub on a free port of loopback."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     try:
-        return endpoint, open_hub(endpoint)
+        return endpoint, ZenohBus(endpoint, is_hub=True)
     except zenoh.ZError as error:  # somebody took the port in between
         raise GroundStationError(f"the hub cannot be opened at {endpoint}: {error}") from error
 

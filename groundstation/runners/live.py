@@ -6,37 +6,28 @@ that is published goes out once more in the record stream.
 """
 
 import heapq
-import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-import zenoh
-
-from groundstation.bus.cdr import codec_of
-from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.envelope import Delivered
 from groundstation.bus.journal import JournalWriter
 from groundstation.bus.listener import Decoder, Remote
-from groundstation.bus.record_stream import RecordWriter
-from groundstation.bus.zenoh_bus import TopicPublisher, ZenohBus, key_of, split_key
+from groundstation.bus.zenoh_bus import ZenohBus, key_of, split_key
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Edge, Port
 from groundstation.declarations.topic import Delivery, Scope
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.recording.policy import ImagePolicy, is_kept
+from groundstation.recording.policy import ImagePolicy
 from groundstation.runners.live_inbox import FromPort, Gone, Inbox
+from groundstation.runners.live_outlets import LiveOutlets
 from groundstation.runners.live_ports import PortThread
-from groundstation.runners.record_sender import RecordSender
 from groundstation.runners.slot import Sequences, Slot
 from groundstation.runners.step import JOURNAL_PERIOD_NS, Step
-from groundstation.runners.witness import Witness
 
 LATCH_PERIOD_NS = 1_000_000_000
-RECORD_PERIOD_NS = 20_000_000
-RECORD_BYTES = 1 << 20
-"""A batch is sent at the latest when it has this size."""
 
 
 @dataclass(slots=True)
@@ -85,21 +76,14 @@ class LiveProcess:
         self._process = process
         self._bus = bus
         self._payloads = payloads
-        self._images = images
         self._is_done = is_done
         self._decoder = Decoder(payloads)
         self._inbox = Inbox()
         self._stopping = threading.Event()
-        self._publishers: dict[tuple[str, str], TopicPublisher] = {}
-        self._latched: dict[tuple[str, str], tuple[Envelope, bytes]] = {}
-        self._record = RecordWriter()
-        self._sender = RecordSender(bus, process)
-        self._record_due_ns = 0
-        self._witness = Witness()
+        self._out = LiveOutlets(bus, process, images, self.stop)
         self._local: deque[Delivered] = deque()
         self._held: list[tuple[int, int, Delivered | Slot]] = []
         self._held_count = 0
-        self._hub_is_gone = False
         self._threads = {
             port.channel: PortThread(port, self._from_port, self._port_trouble, self._inbox.fail)
             for port in ports
@@ -141,8 +125,8 @@ class LiveProcess:
         while not self._stopping.is_set():
             due_ns = min((tick.due_ns for tick in ticks), default=next_journal_ns)
             due_ns = min(due_ns, next_journal_ns)
-            if len(self._record):
-                due_ns = min(due_ns, self._record_due_ns)
+            if self._out.due_ns is not None:
+                due_ns = min(due_ns, self._out.due_ns)
             if self._held:
                 due_ns = min(due_ns, self._held[0][0])
             self._take(due_ns)
@@ -157,13 +141,12 @@ class LiveProcess:
                     if self._is_done():
                         self.stop()
             if now_ns >= next_journal_ns:
-                self._send(self._step.take_journal(now_ns))
+                self._out.send(self._step.take_journal(now_ns))
                 next_journal_ns = now_ns + JOURNAL_PERIOD_NS
             if now_ns >= next_latch_ns:
-                self._repeat_latched()
+                self._out.repeat_latched()
                 next_latch_ns = now_ns + LATCH_PERIOD_NS
-            if now_ns >= self._record_due_ns or self._record.size > RECORD_BYTES:
-                self._flush(now_ns)
+            self._out.flush(now_ns)
 
     # -- in ---------------------------------------------------------------------------------------
 
@@ -182,7 +165,7 @@ class LiveProcess:
             if topic.scope is Scope.PROCESS:
                 keys.add(f"*/{noun}")
             elif (noun, vehicle) not in made_here:
-                keys.add(key_of(topic, vehicle))
+                keys.add(key_of(topic, vehicle, paced=self._step.is_paced((noun, vehicle))))
         for key in sorted(keys):
             self._bus.subscribe(key, self._from_bus)
         self._bus.watch(self._from_watch)
@@ -209,13 +192,12 @@ class LiveProcess:
                 self._note_replaced(remote.key, taken.replaced)
                 delivered = self._decoder.decode(remote)
                 if delivered is not None and delivered.envelope.owner != self._process:
-                    if is_kept(delivered.envelope.topic, self._images):
-                        self._witness.keep(delivered.envelope, remote.payload)
+                    self._out.witness(delivered.envelope, remote.payload)
                     self._step.receive(delivered, time.monotonic_ns())
             case FromPort(port, stamp_ns, data):
                 self._step.arrive(port, stamp_ns, data, time.monotonic_ns())
             case Gone():
-                self._witness.testify(self._record)
+                self._out.testify()
         self._drain()
 
     def _note_replaced(self, key: str, attachments: list[bytes]) -> None:
@@ -246,59 +228,9 @@ class LiveProcess:
         del now_ns
         self._threads[port.channel].write(payload)
 
-    # -- out --------------------------------------------------------------------------------------
-
     def _send_and_keep(self, delivered: Delivered) -> None:
-        self._send(delivered)
+        self._out.send(delivered)
         self._local.append(delivered)
-
-    def _send(self, delivered: Delivered) -> None:
-        """Put a message into the record stream, and on its own key where somebody subscribes."""
-        envelope, payload = delivered
-        topic, owner = envelope[:2]
-        publisher = self._publishers.get((topic.noun, owner))
-        if publisher is None:
-            publisher = self._publishers[topic.noun, owner] = self._bus.publisher(topic, owner)
-        kept = is_kept(topic, self._images)
-        if not kept and not publisher.is_wanted:
-            return
-        encoded = codec_of(type(payload)).encode(payload)
-        if publisher.is_wanted:
-            self._put(publisher, envelope, encoded)
-        if topic.latched:
-            self._latched[topic.noun, owner] = envelope, encoded
-        if kept:
-            self._record.add(envelope, encoded)
-
-    def _put(self, publisher: TopicPublisher, envelope: Envelope, encoded: bytes) -> None:
-        """Hand to the bus; the loop goes on without it, since valves and ports are closed from here."""
-        if self._hub_is_gone:
-            return
-        try:
-            publisher.put(encoded, envelope.attachment())
-        except zenoh.ZError as error:
-            self._lose_hub(str(error))
-
-    def _repeat_latched(self) -> None:
-        """For late joiners, of the topics and of the record stream."""
-        for key, (envelope, encoded) in self._latched.items():
-            publisher = self._publishers[key]
-            if publisher.is_wanted:
-                self._put(publisher, envelope, encoded)
-            self._record.add(envelope, encoded)
-
-    def _flush(self, now_ns: int) -> None:
-        self._record_due_ns = now_ns + RECORD_PERIOD_NS
-        if len(self._record):
-            self._sender.send(self._record)
-        if self._sender.is_broken:
-            self._lose_hub("the record stream cannot be sent")
-
-    def _lose_hub(self, why: str) -> None:
-        if not self._hub_is_gone:
-            self._hub_is_gone = True
-            sys.stderr.write(f"the hub is gone, ending: {why}\n")
-            self.stop()
 
     def _drain(self) -> None:
         """Deliver until no local node has anything to receive."""
@@ -338,9 +270,8 @@ class LiveProcess:
         for thread in self._threads.values():
             thread.close()
         now_ns = time.monotonic_ns()
-        self._send(self._step.take_journal(now_ns))
-        self._flush(now_ns)
-        self._sender.close()
+        self._out.send(self._step.take_journal(now_ns))
+        self._out.close(now_ns)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.port import Port
 from groundstation.declarations.rig import Rig
-from groundstation.declarations.topic import Delivery, Scope
+from groundstation.declarations.topic import Delivery, Pace, Scope
 from groundstation.rig.plan import config_crc, nodes_of
 from groundstation.runners.slot import Sequences, Slot, Timing, owner_of
 
@@ -63,9 +63,12 @@ class Step:
         self._sequences = sequences
         self._transport = transport
         self._receivers: dict[Address, list[Slot]] = {}
+        self._paces: dict[Address, dict[str, Pace]] = {}  # of the slots that take it paced, by their keys
         for slot in slots:
-            for address in inputs_of(slot.node):
+            for kind, address in inputs_of(slot.node):
                 self._receivers.setdefault(address, []).append(slot)
+                if kind in slot.node.paced:
+                    self._paces.setdefault(address, {})[slot.key] = Pace(kind.TOPIC.pace_ns)
         self._writers: dict[Address, Port] = {
             (kind.TOPIC.noun, vehicle): port for port in ports for kind, vehicle in port.writes()
         }
@@ -74,6 +77,10 @@ class Step:
     def received(self) -> Mapping[Address, list[Slot]]:
         """Everything that nodes receive here."""
         return self._receivers
+
+    def is_paced(self, address: Address) -> bool:
+        """Whether all who receive it here take it paced."""
+        return len(self._paces.get(address, ())) == len(self._receivers[address])
 
     def start(self, now_ns: int) -> None:
         """Start every node."""
@@ -112,7 +119,12 @@ class Step:
     def receive(self, delivered: Delivered, now_ns: int) -> None:
         """Give a message of another process to the nodes that receive it."""
         payload = delivered.payload
-        for slot in self._receivers.get((payload.TOPIC.noun, payload.vehicle), ()):
+        address = payload.TOPIC.noun, payload.vehicle
+        paces = self._paces.get(address)
+        for slot in self._receivers.get(address, ()):
+            pace = None if paces is None else paces.get(slot.key)
+            if pace is not None and not pace.passes(delivered.envelope.publish_ns):
+                continue
             if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
                 self._hand_over(slot, delivered, now_ns)
             else:
@@ -154,12 +166,12 @@ class Step:
             publish(delivered)
 
 
-def inputs_of(node: Node) -> Iterable[Address]:
+def inputs_of(node: Node) -> Iterable[tuple[type[Message], Address]]:
     """Topics that a node receives, each with the vehicle of the payload."""
     for kind in node.inputs:
         topic = kind.TOPIC
         for vehicle in ("",) if topic.scope is Scope.RIG else node.sources(kind):
-            yield topic.noun, vehicle
+            yield kind, (topic.noun, vehicle)
 
 
 def build_slots(

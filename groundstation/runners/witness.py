@@ -1,6 +1,6 @@
 """What a process keeps of the others' messages: one that is killed takes its unsent records along.
 
-Messages that somebody waits for leave a process at once, its record stream up to 20 ms later. Whoever took in
+Messages that somebody waits for leave a process at once, its record stream up to 50 ms later. Whoever took in
 such a message can still record it, so that a recording with a death in it replays like any other.
 """
 

@@ -59,6 +59,14 @@ def test_what_triggers_a_node_in_its_ticks_is_one_of_its_inputs(name, nodes):
 
 
 @names
+def test_what_a_node_takes_paced_is_one_of_its_inputs_and_has_a_pace(name, nodes):
+    for key, node in nodes[name].items():
+        for kind in node.paced:
+            assert kind in node.inputs, key
+            assert kind.TOPIC.pace_ns > 0, key
+
+
+@names
 def test_a_topic_of_a_vehicle_has_one_publisher(name, nodes):
     publishers = {}
     for key, node in nodes[name].items():

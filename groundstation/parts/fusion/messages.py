@@ -33,7 +33,7 @@ class VehicleState(Message):
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleState"
-    TOPIC: ClassVar = Topic("state", 100, Rank.ESTIMATE)
+    TOPIC: ClassVar = Topic("state", 100, Rank.ESTIMATE, pace_ns=20_000_000)
     position_table_m: Float64x2
     heading_rad: F64
     velocity_table_m_s: Float64x2

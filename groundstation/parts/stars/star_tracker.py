@@ -47,6 +47,7 @@ class StarTracker(Node):
     """
 
     inputs = (StarSpots, VehicleState, Request)
+    paced = (VehicleState,)
     outputs = (StarFix, SkyChange, StarMatches, CalibrationInUse, Ack)
 
     def __init__(

@@ -39,6 +39,7 @@ class CommandMux(Node):
     """
 
     inputs = (ValveDemand, VehicleState, Request)
+    paced = (VehicleState,)
     outputs = (ValveSelection, Ack)
     trigger = ValveDemand
 

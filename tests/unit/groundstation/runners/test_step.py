@@ -10,6 +10,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.port import Edge, Port
 from groundstation.declarations.request import Request
 from groundstation.declarations.topic import Delivery, Scope
+from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import ImuBytes, ImuOrder
 from groundstation.parts.stars.messages import StarImage, StarMatches
 from groundstation.parts.valves.messages import CanIn
@@ -120,6 +121,10 @@ def image(stamp_ns, vehicle="alpha"):
     return StarImage(stamp_ns, vehicle, 0, 1, 1, "mono8", 1, b"x")
 
 
+def state(stamp_ns):
+    return VehicleState(stamp_ns, "alpha", (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, (0.0, 0.0, 0.0), "flying", 0)
+
+
 def request(stamp_ns):
     return Request(stamp_ns, "alpha", 1, "operator", "picture", "")
 
@@ -137,9 +142,23 @@ def test_a_node_receives_the_topics_of_its_sources_and_no_others():
     assert [message.vehicle for _, message in node.taken] == ["alpha", "bravo"]
 
 
+def test_who_takes_a_topic_paced_receives_the_first_of_each_period_the_others_all():
+    class PacedTaker(Taker):
+        paced = (VehicleState,)
+
+    slow, fast = PacedTaker("alpha", VehicleState), Taker("alpha", VehicleState)
+    bench = Bench(slow, fast)
+    assert not bench.step.is_paced(("state", "alpha"))
+    assert Bench(PacedTaker("alpha", VehicleState)).step.is_paced(("state", "alpha"))
+    for stamp_ms in (1, 5, 19, 20, 24, 61, 79, 80):
+        bench.step.deliver(delivered(state(stamp_ms * MS)), stamp_ms * MS)
+    assert [now_ns // MS for now_ns, _ in slow.taken] == [1, 20, 61, 80]
+    assert len(fast.taken) == 8
+
+
 def test_what_belongs_to_the_whole_rig_is_received_by_nodes_of_vehicles():
     node = Taker("alpha", CanIn)
-    assert list(inputs_of(node)) == [("can_in", "")]
+    assert list(inputs_of(node)) == [(CanIn, ("can_in", ""))]
     bench = Bench(node)
     bench.step.deliver(delivered(CanIn(5, "", 0x181, b"")), 6)
     assert len(node.taken) == 1
