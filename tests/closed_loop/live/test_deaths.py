@@ -111,7 +111,8 @@ def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launc
     for _ in range(4):
         run.wait_for("alpha", "flying", "open")
     assert run.end()[0] == 0
-    assert longest_silence_s(of(run.recording, StarFix, "alpha")) > 0.5
+    gap_s = longest_silence_s(of(run.recording, StarFix, "alpha"))
+    assert gap_s > 3 / 15, "the sky did not fall silent for even three pictures: was it killed?"
     assert longest_silence_s(of(run.recording, StarFix, "beta")) < 1.0
     for vehicle in ("alpha", "beta"):
         assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0
