@@ -7,16 +7,17 @@ from groundstation.declarations.node import Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import LABORATORY, Rig, check_address
-from groundstation.parts.motion_capture.capture_frame import CaptureFrame
-from groundstation.parts.motion_capture.capture_reader import CapturedBody, CaptureReader
 from groundstation.parts.motion_capture.gauges import GAUGES
 from groundstation.parts.motion_capture.messages import CapturedPose, CaptureFix
 from groundstation.parts.motion_capture.port import CapturePort
 from groundstation.parts.motion_capture.sections import (
+    CapturedBodySection,
     MotionCaptureOfRig,
     MotionCaptureOfVehicle,
     MotionCaptureSection,
 )
+
+_READER = "groundstation.parts.motion_capture.capture_reader:CaptureReader"
 
 
 def _system(rig: Rig) -> MotionCaptureSection | None:
@@ -40,25 +41,28 @@ def _floor(rig: Rig, vehicle: str) -> Floor:
     return 0.0, 0.0
 
 
-def _bodies(rig: Rig) -> dict[str, CapturedBody]:
-    found = {}
-    for vehicle in rig.vehicles:
-        section = rig.vehicle(vehicle, MotionCaptureOfVehicle).motion_capture
-        if section is not None:
-            yaw_rad = math.radians(section.pivot_yaw_deg)
-            body = CapturedBody(vehicle, section.pivot_body_m, yaw_rad, section.is_reference)
-            found[section.body or vehicle] = body
-    return found
+def _bodies(rig: Rig) -> dict[str, tuple[str, CapturedBodySection]]:
+    """Vehicle and section by the name of the rigid body."""
+    sections = {name: rig.vehicle(name, MotionCaptureOfVehicle).motion_capture for name in rig.vehicles}
+    return {own.body or name: (name, own) for name, own in sections.items() if own is not None}
 
 
 def _reader(rig: Rig, vehicle: str) -> Node:
+    # SciPy loads only where it is used
+    from groundstation.parts.motion_capture.capture_frame import CaptureFrame
+    from groundstation.parts.motion_capture.capture_reader import CapturedBody, CaptureReader
+
     del vehicle
     system = _system(rig)
     assert system is not None
     frame = CaptureFrame(system.up, system.origin_table_m, math.radians(system.yaw_deg))
+    bodies = {
+        body: CapturedBody(name, own.pivot_body_m, math.radians(own.pivot_yaw_deg), own.is_reference)
+        for body, (name, own) in _bodies(rig).items()
+    }
     return CaptureReader(
         frame,
-        _bodies(rig),
+        bodies,
         system.delay_s,
         system.delay_sigma_s,
         system.sigma_xy_m,
@@ -116,7 +120,7 @@ PART = Part(
             "capture_reader",
             "motion_capture",
             Weight.LIGHT,
-            CaptureReader,
+            _READER,
             _reader,
             _has_system,
             is_of_rig=True,
