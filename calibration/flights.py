@@ -23,7 +23,8 @@ from groundstation.parts.stars.messages import StarFix
 from groundstation.parts.stars.sections import StarsOfType, StarsOfVehicle
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.recording.reader import Recording
-from groundstation.rig.read import load_rig, parse_rig
+from groundstation.rig.provenance import recorded_rig
+from groundstation.rig.read import load_rig
 from groundstation.runners.replay import ReplayRunner
 
 READ = (Imu, StarFix, ValveStatus, ReferenceState)
@@ -79,7 +80,7 @@ def opened(source: Path, rig_path: Path | None = None) -> Iterator[tuple[Recordi
         if rig_path is not None:
             rig = load_rig(rig_path)
         elif recording.info.rig_toml:
-            rig = parse_rig(recording.info.rig_toml, Path(recording.info.rig_path or source))
+            rig = recorded_rig(recording)
         else:
             raise UsageError(f"{source} holds no rig: name one with --rig.")
         yield recording, rig

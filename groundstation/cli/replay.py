@@ -20,11 +20,11 @@ from groundstation.recording.reader import Recording
 from groundstation.recording.software import software
 from groundstation.recording.writer import Recorder
 from groundstation.rig.plan import make_node
-from groundstation.rig.provenance import file_hashes
+from groundstation.rig.provenance import changed_files, portable, recorded_rig
 from groundstation.rig.read import parse_rig
 from groundstation.runners.replay import ReplayRunner
-from groundstation.runners.replay_comparison import EXACT, Tolerances, load_tolerances
 from groundstation.runners.replay_report import ReplayReport
+from groundstation.runners.tolerances import EXACT, Tolerances, load_tolerances
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -67,9 +67,8 @@ def _replay(
     found: Recording, nodes: list[str] | None, out: Path | None, rig_path: Path | None, allowed: Tolerances
 ) -> ReplayReport:
     info, rig = _rig_of(found, rig_path)
-    for name, digest in file_hashes(rig).items():
-        if found.info.calibration_sha256.get(name, digest) != digest:
-            print(f"calibration {name} is not the one of the recording")
+    for sentence in changed_files(rig, found.info):
+        print(sentence)
     if info.software not in ("", software()):
         print(
             f"recorded with {info.software}, replayed with {software()}: figures may differ by their rounding"
@@ -90,12 +89,13 @@ def _rig_of(found: Recording, rig_path: Path | None) -> tuple[RecordingInfo, Rig
     info = found.info
     if rig_path is not None:
         try:
-            info = replace(info, rig_toml=rig_path.read_text(), rig_path=str(rig_path))
+            info = replace(info, rig_toml=rig_path.read_text(), rig_path=portable(rig_path))
         except (OSError, UnicodeDecodeError) as error:
             raise UsageError(f"{rig_path}: cannot be read as a rig file ({error})") from error
-    elif not info.rig_toml:
+        return info, parse_rig(info.rig_toml, rig_path)
+    if not info.rig_toml:
         raise UsageError(f"{found.path} carries no rig: give one with --rig")
-    return info, parse_rig(info.rig_toml, Path(info.rig_path))
+    return info, recorded_rig(found)
 
 
 def _factory(rig: Rig) -> Callable[[str], Node]:
@@ -115,8 +115,6 @@ def _print_report(report: ReplayReport) -> None:
         print(reason)
     if report.before_start:
         print(f"{report.before_start} journal entries stand before the first start of their node: left out")
-    for name, count in report.missing_inputs.items():
-        print(f"{name}: {count} messages that the node consumed are not in the recording")
     table = Table(
         "topic",
         "of",
@@ -140,8 +138,7 @@ def _print_report(report: ReplayReport) -> None:
         )
         table.add_row(result.noun, result.owner, *(str(count) if count else "" for count in counts))
     console.print(table)
-    for result in report.results:
-        if result.first is not None:
-            print(f"{result.owner}/{result.noun}: first difference in {result.first}")
+    for sentence in report.differences():
+        print(sentence)
     verdict = "all agrees" if report.agrees else "NOT the same"
     print(f"{len(report.nodes)} nodes, {report.inputs} inputs, {report.ticks} ticks: {verdict}")

@@ -14,9 +14,10 @@ from groundstation.declarations.node import Node
 from groundstation.recording.policy import is_kept
 from groundstation.recording.reader import Recorded, Recording
 from groundstation.recording.writer import Recorder
-from groundstation.runners.replay_comparison import EXACT, Comparison, Tolerances
+from groundstation.runners.replay_comparison import Comparison
 from groundstation.runners.replay_node import NodeFactory, ReplayedNode
 from groundstation.runners.replay_report import ReplayReport
+from groundstation.runners.tolerances import EXACT, Tolerances
 
 LOOK_AHEAD_NS = 2_000_000_000  # a recorder may log a message later than the process that consumed it
 

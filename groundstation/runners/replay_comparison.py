@@ -2,26 +2,17 @@
 
 import math
 import struct
-import tomllib
-from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 
-from groundstation.bus.cdr import codec_of, ros_fields
+from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
-from groundstation.declarations.errors import UsageError
 from groundstation.declarations.message import Message
 from groundstation.recording.reader import Recorded
 from groundstation.recording.writer import Recorder
 from groundstation.runners.replay_report import Difference, TopicResult
-
-Tolerances = Mapping[str, Mapping[str, float]]
-"""Noun of a topic to field to the largest absolute difference, in the field's unit."""
-
-EXACT: Tolerances = {}
-
+from groundstation.runners.tolerances import Tolerances
 
 FORGET_NS = 5_000_000_000  # recorded outputs that the journal has not claimed by then are other nodes'
 
@@ -130,43 +121,17 @@ def difference(
     if codec_of(type(replayed)).encode(replayed) == recorded.data:
         return True, None
     then = recorded.payload
-    allowed = tolerances.get(replayed.TOPIC.noun, {})
+    noun, sequence = replayed.TOPIC.noun, recorded.envelope.sequence
     for field in fields(then):
-        a, b = getattr(then, field.name), getattr(replayed, field.name)
-        if _bits(a) != _bits(b) and not _close(a, b, allowed.get(field.name), field.name):
-            return False, Difference(
-                recorded.envelope.sequence, then.stamp_ns, field.name, _short(a), _short(b)
-            )
+        name = field.name
+        a, b = getattr(then, name), getattr(replayed, name)
+        if _bits(a) == _bits(b):
+            continue
+        apart = _apart(a, b, name)
+        allowed = tolerances.allowed(noun, name) if _is_floating(a) else None
+        if apart is None or allowed is None or not apart <= allowed:
+            return False, Difference(sequence, then.stamp_ns, name, _short(a), _short(b), apart)
     return False, None
-
-
-def load_tolerances(path: Path, payloads: Mapping[str, type[Message]]) -> Tolerances:
-    """Read tolerances: a TOML with one table per topic, ``field = largest absolute difference``.
-
-    Args:
-        path: Of the file.
-        payloads: Payload classes by noun.
-
-    Raises:
-        UsageError: The file cannot be read, or names a topic or field that does not exist.
-    """
-    try:
-        said = tomllib.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{path}: cannot be read as tolerances ({error})") from error
-    for noun, table in said.items():
-        try:
-            known = dict(ros_fields(payloads[noun]))
-        except KeyError:
-            raise UsageError(f"{path}: {noun!r} is no topic") from None
-        if not isinstance(table, dict):
-            raise UsageError(f"{path}: {noun}: expected a table of fields, found {table!r}")
-        for name, value in table.items():
-            if not known.get(name, "").startswith("float"):
-                raise UsageError(f"{path}: {noun}.{name} is no field of floating-point numbers")
-            if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0:
-                raise UsageError(f"{path}: {noun}.{name}: expected a number from 0 up, found {value!r}")
-    return said
 
 
 def _bits(value: object) -> object:
@@ -180,18 +145,30 @@ def _bits(value: object) -> object:
     return value
 
 
-def _close(a: object, b: object, allowed: float | None, name: str) -> bool:
-    if allowed is None:
-        return False
+def _apart(a: object, b: object, name: str) -> float | None:
+    """The largest difference of two values of numbers; None where that means nothing."""
+    if type(a) is int and type(b) is int:
+        return float(abs(a - b))
+    if not _is_floating(a) or not _is_floating(b):
+        return None
     first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
-        return False
+        return None
     with np.errstate(invalid="ignore"):  # inf - inf: equal infinities are found by the bits
         apart = first - second
     if name.endswith("_rad"):  # an angle may have crossed the seam at pi
-        apart = np.remainder(apart + math.pi, 2 * math.pi) - math.pi
-    same = (first == second) | np.isnan(first)
-    return bool(np.all(same | (np.abs(apart) <= allowed)))
+        with np.errstate(invalid="ignore"):
+            apart = np.remainder(apart + math.pi, 2 * math.pi) - math.pi
+    apart = np.abs(np.where((first == second) | np.isnan(first), 0.0, apart))
+    return None if np.isnan(apart).any() else float(apart.max(initial=0.0))
+
+
+def _is_floating(value: object) -> bool:
+    if isinstance(value, np.ndarray):
+        return bool(np.issubdtype(value.dtype, np.floating))
+    if isinstance(value, tuple | list):
+        return all(isinstance(element, float) for element in value)
+    return isinstance(value, float)
 
 
 def _short(value: object) -> str:

@@ -13,6 +13,7 @@ class Difference:
         field: Name of the field; ``topic`` where another topic was said.
         recorded: The recorded value.
         replayed: The replayed value.
+        apart: Largest difference of numbers, None where the values are not comparable ones.
     """
 
     sequence: int
@@ -20,11 +21,13 @@ class Difference:
     field: str
     recorded: str
     replayed: str
+    apart: float | None = None
 
     def __str__(self) -> str:
+        apart = "" if self.apart is None else f"{self.apart:.3g} apart, "
         return (
             f"{self.field}: recorded {self.recorded}, replayed {self.replayed} "
-            f"(sequence {self.sequence}, stamp {self.stamp_ns} ns)"
+            f"({apart}sequence {self.sequence}, stamp {self.stamp_ns} ns)"
         )
 
 
@@ -83,6 +86,21 @@ class ReplayReport:
     before_start: int = 0
     missing_inputs: dict[str, int] = field(default_factory=dict)
     config_crcs: dict[str, int] = field(default_factory=dict)
+
+    def differences(self) -> list[str]:
+        """One sentence for each topic or input that does not agree."""
+        found = [
+            f"{name}: {count} messages that the node consumed are not in the recording"
+            for name, count in self.missing_inputs.items()
+        ]
+        for result in self.results:
+            if result.agrees:
+                continue
+            name = f"{result.owner}/{result.noun}"
+            counts = f"{result.different} different, {result.missing} missing, {result.extra} extra"
+            first = "" if result.first is None else f": first difference in {result.first}"
+            found.append(f"{name}: {counts}{first}")
+        return found
 
     @property
     def agrees(self) -> bool:

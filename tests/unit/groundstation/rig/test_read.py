@@ -9,7 +9,7 @@ import pytest
 from groundstation.declarations.errors import RigError
 from groundstation.parts.stars.sections import StarsOfType
 from groundstation.rig.plan import make_node, nodes_of
-from groundstation.rig.provenance import file_hashes, recording_info
+from groundstation.rig.provenance import file_hashes, portable, recording_info
 from groundstation.rig.read import build_rig, bytes_of, files_of, load_rig, parse_rig, read_text
 from groundstation.star_tracking.camera_model import CameraCalibration
 
@@ -65,7 +65,14 @@ def test_files_have_their_keys_bytes_and_hashes():
     assert file_hashes(rig)[KEY] == hashlib.sha256(file.data).hexdigest()
     info = recording_info(rig, STARS.read_text(), STARS, 3, None)
     assert info.calibration_sha256 == file_hashes(rig)
-    assert info.rig_path == str(STARS.resolve())
+    assert info.rig_path == portable(STARS)
+
+
+def test_a_rig_file_is_recorded_relative_to_the_working_directory_if_it_lies_below(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert portable(Path("rigs") / ".." / "rigs" / "my.toml") == "rigs/my.toml"
+    assert portable(tmp_path / "my.toml") == "my.toml"
+    assert portable(STARS) == str(STARS.resolve())
 
 
 def test_what_a_run_was_handed_is_used_in_place_of_the_disk(tmp_path, reads):

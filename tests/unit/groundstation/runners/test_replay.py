@@ -23,6 +23,7 @@ from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.recording.writer import Recorder
 from groundstation.runners.replay import ReplayRunner, recorded_nodes
+from groundstation.runners.tolerances import Tolerances
 
 PAYLOADS = installed_tables().payloads
 KINDS = PAYLOADS.values()
@@ -235,10 +236,12 @@ def test_tolerances_forgive_as_much_as_they_say(path):
         gain = 1.0 / 3.0 * (1 + 1e-14)
 
     tight = {"wrench": {"force_x_n": 1e-9, "torque_z_nm": 1e-9}}
-    report = replay(path, Rounded, tolerances=tight | {"control_status": {"goal_position_table_m": 1e-9}})
+    report = replay(
+        path, Rounded, tolerances=Tolerances(tight | {"control_status": {"goal_position_table_m": 1e-9}})
+    )
     assert report.agrees
     assert sum(r.close for r in report.results) > 50
-    report = replay(path, Rounded, tolerances=tight)
+    report = replay(path, Rounded, tolerances=Tolerances(tight))
     assert {r.noun for r in report.results if not r.agrees} == {"control_status"}
 
 

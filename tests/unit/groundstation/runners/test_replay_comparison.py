@@ -10,7 +10,8 @@ from groundstation.declarations.errors import UsageError
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recorded
-from groundstation.runners.replay_comparison import difference, load_tolerances
+from groundstation.runners.replay_comparison import difference
+from groundstation.runners.tolerances import EXACT, Tolerances, load_tolerances
 
 CODEC = codec_of(ControlStatus)
 PAYLOADS = installed_tables().payloads
@@ -23,7 +24,7 @@ def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
 def compare(then, now, **allowed):
     envelope = Envelope(ControlStatus.TOPIC, "alpha", 3, 5)
     recorded = Recorded(envelope, CODEC.encode(then), 5, CODEC.decode)
-    return difference(recorded, now, {"control_status": allowed})
+    return difference(recorded, now, Tolerances({"control_status": allowed}))
 
 
 def test_equal_bits_need_no_tolerance():
@@ -57,7 +58,9 @@ def test_texts_and_integers_have_no_tolerance():
 def test_tolerances_are_read_from_toml(tmp_path):
     path = tmp_path / "t.toml"
     path.write_text("[wrench]\nforce_x_n = 1e-9\n[fix_account]\nnis = 1\n")
-    assert load_tolerances(path, PAYLOADS) == {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
+    assert load_tolerances(path, PAYLOADS) == Tolerances(
+        {"wrench": {"force_x_n": 1e-9}, "fix_account": {"nis": 1}}
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,6 +72,10 @@ def test_tolerances_are_read_from_toml(tmp_path):
         ("[control_status]\ncontroller = 1\n", "no field of floating-point"),
         ("[wrench]\nforce_x_n = -1\n", "from 0 up"),
         ("[wrench]\nforce_x_n = nan\n", "from 0 up"),
+        ("[wrench]\nforce_x_n = inf\n", "from 0 up"),
+        ("[default]\nm = -1\n", "default.m: expected a number from 0 up"),
+        ("default = 1e-9\n", "expected a table"),
+        ("[default]\nfurlong = 1e-9\n", "default.furlong is no field"),
         ("[wrench]\nforce_x_n = true\n", "from 0 up"),
         ("[state\n", "cannot be read"),
     ],
@@ -83,3 +90,30 @@ def test_wrong_tolerances_are_refused_in_one_sentence(tmp_path, text, sentence):
 def test_tolerances_that_are_not_there_are_refused(tmp_path):
     with pytest.raises(UsageError, match="cannot be read"):
         load_tolerances(tmp_path / "nothing.toml", PAYLOADS)
+
+
+def test_what_no_table_of_a_topic_names_has_the_tolerance_of_its_unit(tmp_path):
+    path = tmp_path / "t.toml"
+    path.write_text("[default]\nm = 1e-9\nrad_s = 1e-8\nother = 1e-3\n[wrench]\nforce_x_n = 0.5\n")
+    found = load_tolerances(path, PAYLOADS)
+    assert found.allowed("wrench", "force_x_n") == 0.5
+    assert found.allowed("state", "position_table_m") == 1e-9
+    assert found.allowed("imu", "rate_body_rad_s") == 1e-8
+    assert found.allowed("fix_account", "nis") == 1e-3
+    assert EXACT.allowed("state", "position_table_m") is None
+
+
+def test_a_unit_forgives_numbers_and_nothing_else():
+    def replayed(now):
+        envelope = Envelope(ControlStatus.TOPIC, "alpha", 3, 5)
+        recorded = Recorded(envelope, CODEC.encode(status()), 5, CODEC.decode)
+        return difference(recorded, now, Tolerances(by_unit={"m": 0.1, "ns": 1e9, "other": 1e9}))
+
+    assert replayed(status(error_m=0.09)) == (False, None)
+    assert replayed(status(error_m=0.11))[1].apart == pytest.approx(0.11)
+    assert replayed(ControlStatus(6, "alpha", "station", (0.0, 0.0), 0.0, 0.0, 0.0))[1].field == "stamp_ns"
+    assert replayed(ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0))[1].apart is None
+
+
+def test_a_difference_is_told_with_its_size():
+    assert "0.25 apart, sequence 3" in str(compare(status(), status(error_m=0.25))[1])
