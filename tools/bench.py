@@ -2,6 +2,7 @@
 
     make bench
     python tools/bench.py --only star fusion
+    python tools/bench.py --only house --before ../commit_before
     python tools/bench.py --only star_lights --trials 3750
     python tools/bench.py --only star_folder --folder recordings/ceiling
     python tools/bench.py --fresh-clone --live-minutes 10 --write docs/benchmarks.md
@@ -22,7 +23,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy loads: figures are per core
 
 import cv2  # noqa: E402
-from bench import fresh_clone, live, lockstep_speed, many_mock_ups, overhead, parser, station_keeping  # noqa: E402
+from bench import fresh_clone, house, live, lockstep_speed, many_mock_ups, overhead, parser, station_keeping  # noqa: E402
 from bench import table as bench_table  # noqa: E402
 from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
 from bench.fusion import folder as fusion_folder  # noqa: E402
@@ -40,6 +41,7 @@ from rich.console import Console  # noqa: E402
 MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
+        "house": house.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
         "parser": parser.measure,
@@ -80,6 +82,7 @@ def run(arguments: argparse.Namespace) -> list[Row]:
                     frames=arguments.frames,
                     trials=arguments.trials,
                     data=arguments.folder,
+                    before=arguments.before,
                     unit_s=reference_unit_s(),
                     say=status.update,
                 )
@@ -104,6 +107,7 @@ def main() -> None:
         "--trials", type=int, default=400, help="pictures per number of random lights, of eight"
     )
     words.add_argument("--folder", type=Path, help="data with truth, for star_folder and fusion_folder")
+    words.add_argument("--before", type=Path, help="checkout of an earlier commit with its .venv, for house")
     words.add_argument("--write", type=Path, metavar="PAGE", help="put the tables into this Markdown page")
     arguments = words.parse_args()
     for name, pattern in FOLDERS.items():

@@ -21,17 +21,24 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(Path(__file__).parents[1]))  # run as a file of its own
+from bench.rows import ROOT, Bench, Row
+
 RIG = Path("examples/rigs/two_mock_ups.toml")
 READY = "all processes are ready"
 READY_WITHIN_S, ENDED_WITHIN_S = 60.0, 20.0
 STATION, EMULATOR = "station, all", "emulator"
 LAUNCHER, FORK_SERVER = "launcher", "fork server"
 GROUPS = (LAUNCHER, FORK_SERVER, "recorder", "commands", "flights", "skies", "station", "others")
+SECONDS, SETTLE_S, RUNS = 20.0, 12.0, 3
+LIMITS = {"ready, s": 4.0, f"CPU, cores: {LAUNCHER}": 0.08}
+"""Of figures, on the machine of docs/benchmarks.md."""
+RATIO_LIMITS = {f"CPU, cores: {STATION}": 0.5, f"PSS, MB: {STATION}": 0.5}
+"""Of figures to those of the checkout before."""
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 
 
@@ -257,6 +264,49 @@ def _cell(value: float | None) -> str:
     return f"{value:10.3f}" if value is not None else f"{'-':>10}"
 
 
+def measure(bench: Bench) -> list[Row]:
+    """What processes cost, of this checkout and, in turn with it, of the one before where one was named."""
+    checkouts = {"now": ROOT} if bench.before is None else {"before": bench.before.absolute(), "now": ROOT}
+    costs = _fly(checkouts, RIG, SECONDS, SETTLE_S, RUNS, bench.say)
+    now = _medians(costs["now"])
+    before = _medians(costs["before"]) if "before" in costs else {}
+    rows = []
+    for name, figure in now.items():
+        most, most_ratio = LIMITS.get(name), RATIO_LIMITS.get(name)
+        ratio = figure / before[name] if before.get(name) else None
+        limits = [f"{most:g}"] if most is not None else []
+        limits += [f"{most_ratio:g} of before"] if most_ratio is not None else []
+        verdicts = [figure <= most] if most is not None else []
+        verdicts += [ratio <= most_ratio] if most_ratio is not None and ratio is not None else []
+        beside = "" if ratio is None else f" ({ratio:.2f} of {before[name]:.3g})"
+        rows.append(
+            Row(name, ", ".join(limits), f"{figure:.3g}{beside}", all(verdicts) if verdicts else None)
+        )
+    return rows
+
+
+def _fly(
+    checkouts: Mapping[str, Path],
+    rig: Path,
+    seconds: float,
+    settle_s: float,
+    runs: int,
+    say: Callable[[str], None],
+) -> dict[str, list[Cost]]:
+    """Runs of all checkouts in turn."""
+    costs: dict[str, list[Cost]] = {name: [] for name in checkouts}
+    for number in range(runs):
+        for name, checkout in checkouts.items():
+            cost = run_once(checkout, rig, seconds, settle_s)
+            costs[name].append(cost)
+            say(
+                f"run {number + 1}, {name}: ready in {cost.ready_s:.2f} s, "
+                f"{sum(cost.cpu_cores.get(group, 0.0) for group in GROUPS):.2f} cores, "
+                f"{sum(cost.pss_mb.get(group, 0.0) for group in GROUPS):.0f} MB"
+            )
+    return costs
+
+
 def main() -> None:
     """Parse the words, fly, print."""
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -275,20 +325,17 @@ def main() -> None:
     for checkout in checkouts.values():
         if not (checkout / ".venv" / "bin" / "groundstation").exists():
             words.error(f"{checkout} has no .venv/bin/groundstation: run `make` there first")
-    costs: dict[str, list[Cost]] = {name: [] for name in checkouts}
-    for number in range(arguments.runs):
-        for name, checkout in checkouts.items():
-            try:
-                cost = run_once(checkout, arguments.rig, arguments.seconds, arguments.settle)
-            except HouseError as error:
-                sys.exit(f"house: {error}")
-            costs[name].append(cost)
-            print(
-                f"run {number + 1}, {name}: ready in {cost.ready_s:.2f} s, "
-                f"{sum(cost.cpu_cores.get(group, 0.0) for group in GROUPS):.2f} cores, "
-                f"{sum(cost.pss_mb.get(group, 0.0) for group in GROUPS):.0f} MB",
-                flush=True,
-            )
+    try:
+        costs = _fly(
+            checkouts,
+            arguments.rig,
+            arguments.seconds,
+            arguments.settle,
+            arguments.runs,
+            lambda line: print(line, flush=True),
+        )
+    except HouseError as error:
+        sys.exit(f"house: {error}")
     before = _medians(costs["before"]) if "before" in costs else {}
     print(_table(_medians(costs["now"]), before))
 

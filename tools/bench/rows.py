@@ -42,6 +42,7 @@ class Bench:
         frames: How many star pictures of each kind.
         trials: How many pictures of each number of random lights.
         data: Folder with a data set and its truth, where one was named.
+        before: Checkout of an earlier commit to stand beside, where one was named.
         unit_s: CPU seconds of the reference unit on this machine, in this run.
         say: Takes one line about what is going on.
     """
@@ -52,6 +53,7 @@ class Bench:
     frames: int
     trials: int
     data: Path | None
+    before: Path | None
     unit_s: float
     say: Callable[[str], None]
 
