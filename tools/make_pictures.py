@@ -64,7 +64,7 @@ class Flight:
                     (t_s, *said.position_table_m, said.heading_rad)
                 )
             case VehicleState(status="flying"):
-                row = (t_s, *said.position_table_m, said.heading_rad, *said.pose_std)
+                row = (t_s, *said.position_table_m, said.heading_rad, *said.pose_sigma)
                 self.state.setdefault(said.vehicle, []).append(row)
             case StarImage():
                 self.images[said.vehicle] = said
@@ -157,7 +157,8 @@ def draw_frame(
     axes.set_ylim(image.shape[0] - 0.5, -0.5)
     axes.set_xticks([])
     axes.set_yticks([])
-    off = f"{fix.stars} stars, sigma {1e3 * fix.std_x_m:.3f} mm, {math.degrees(fix.std_heading_rad):.4f} deg"
+    off_deg = math.degrees(fix.sigma_heading_rad)
+    off = f"{fix.stars} stars, sigma {1e3 * fix.sigma_x_m:.3f} mm, {off_deg:.4f} deg"
     axes.set_title(f"Alpha's star camera: {off}", color=INK, fontsize=9)
 
 

@@ -73,7 +73,7 @@ def calibrate_intrinsics(
     catalogue: StarCatalogue,
     camera: CameraCalibration,
     *,
-    wobble_std_m: float | None = None,
+    wobble_sigma_m: float | None = None,
     progress: Progress | None = None,
 ) -> SkyCalibration:
     """Calibrate focal lengths, principal point and distortion; height and mount are held.
@@ -85,13 +85,13 @@ def calibrate_intrinsics(
         pictures: Spots of the pictures.
         catalogue: The stars.
         camera: First guess of the intrinsics; mount and height as known.
-        wobble_std_m: For pictures made by turning in place: how far the body origin moved.
+        wobble_sigma_m: For pictures made by turning in place: how far the body origin moved.
         progress: Called with the step's number and the residual RMS in px.
 
     Raises:
         SkyCalibrationError: Too few pictures can be solved, or they do not determine the lens.
     """
-    in_place = None if wobble_std_m is None else PosePriorTerm(wobble_std_m)
+    in_place = None if wobble_sigma_m is None else PosePriorTerm(wobble_sigma_m)
     return _calibrate(pictures, catalogue, camera, (*FOCAL, *CENTRE, *DISTORTION), in_place, progress)
 
 
@@ -100,7 +100,7 @@ def calibrate_mount(
     catalogue: StarCatalogue,
     camera: CameraCalibration,
     *,
-    wobble_std_m: float = 1e-3,
+    wobble_sigma_m: float = 1e-3,
     first_heading_rad: float | None = None,
     progress: Progress | None = None,
 ) -> SkyCalibration:
@@ -110,7 +110,7 @@ def calibrate_mount(
         pictures: Spots of the pictures.
         catalogue: The stars.
         camera: Intrinsics, and the mount as far as known.
-        wobble_std_m: How far the body origin may have moved while turning.
+        wobble_sigma_m: How far the body origin may have moved while turning.
         first_heading_rad: True heading of the first solved picture; it gives the yaw.
         progress: Called with the step's number and the residual RMS in px.
 
@@ -118,7 +118,7 @@ def calibrate_mount(
         SkyCalibrationError: Too few pictures can be solved, or the turn is too small.
     """
     found = _calibrate(
-        pictures, catalogue, camera, (*OFFSET, *TILT, *HEIGHT), PosePriorTerm(wobble_std_m), progress
+        pictures, catalogue, camera, (*OFFSET, *TILT, *HEIGHT), PosePriorTerm(wobble_sigma_m), progress
     )
     heading = np.unwrap(found.adjusted.pose[:, 2])
     if float(np.ptp(heading)) < _MIN_SPAN_RAD:
@@ -154,8 +154,8 @@ def _calibrate(
     progress: Progress | None,
 ) -> SkyCalibration:
     star = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
-    std = np.maximum(catalogue.std_m, _EXACT_STAR_STD_M)
-    known = StarPrior(np.arange(len(star)), star, std)
+    sigma = np.maximum(catalogue.sigma_m, _EXACT_STAR_STD_M)
+    known = StarPrior(np.arange(len(star)), star, sigma)
     result: SkyCalibration | None = None
     if "fx" in free:
         camera = _rough_focal_length(pictures, catalogue, camera)
@@ -226,7 +226,7 @@ def _matches(
         frames.append(np.full(len(spot), row))
         stars.append(nearest[spot])
         pixels.append(np.stack((spots.u_px[spot], spots.v_px[spot]), axis=1))
-        variance = 0.5 * (spots.cov_px2[spot, 0] + spots.cov_px2[spot, 2])
+        variance = 0.5 * (spots.covariance_px2[spot, 0] + spots.covariance_px2[spot, 2])
         sigmas.append(np.sqrt(variance + _CENTRE_FLOOR_PX**2))
     return Observations(
         np.concatenate(frames), np.concatenate(stars), np.concatenate(pixels), np.concatenate(sigmas)

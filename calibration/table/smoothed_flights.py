@@ -146,8 +146,8 @@ def _flight_log(name: str, tap: _Tap) -> FlightLog:
     fixes = [f for f in fixes if t[0] <= (f.t_exposure_ns - origin_ns) * 1e-9 <= t[-1]]
     exposure = np.array([f.t_exposure_ns - origin_ns for f in fixes]) * 1e-9
     velocity = np.column_stack([np.interp(exposure, t, smoothed[:, k]) for k in (3, 4)])
-    cov = np.array([f.cov[:2, :2] for f in fixes]).reshape(-1, 2, 2)
-    cov = cov + noise.fix_time_sigma_s**2 * velocity[:, :, None] * velocity[:, None, :]
+    covariance = np.array([f.covariance[:2, :2] for f in fixes]).reshape(-1, 2, 2)
+    covariance = covariance + noise.fix_time_sigma_s**2 * velocity[:, :, None] * velocity[:, None, :]
     return FlightLog(
         name=name,
         end_s=end,
@@ -159,7 +159,7 @@ def _flight_log(name: str, tap: _Tap) -> FlightLog:
         is_hole=~good,
         fix_s=exposure + noise.acc_lag_s,
         fix_position_m=np.array([(f.x_m, f.y_m) for f in fixes]).reshape(-1, 2),
-        fix_cov_m2=cov,
+        fix_covariance_m2=covariance,
         fix_heading_rad=np.interp(exposure, t, smoothed[:, 2]),
         fix_velocity_m_s=velocity,
         rests_s=rests,

@@ -116,7 +116,7 @@ def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
     if isinstance(answer, NoFix):
         return [frame, "0", "", "", "", f"{ms:.3f}", "0", "", "", "", answer.reason.value]
     pose = (answer.x_m, answer.y_m, answer.heading_rad)
-    spread = (answer.std_x_m, answer.std_y_m, answer.std_heading_rad)
+    spread = (answer.sigma_x_m, answer.sigma_y_m, answer.sigma_heading_rad)
     if not all(math.isfinite(value) for value in (*pose, *spread)):
         raise AssertionError(f"frame {frame}: the solver gave a fix that is not finite")
     return [

@@ -181,7 +181,7 @@ class FixJudge:
         if rests.at(a) is not None and rests.at(b) is not None:
             return fixes_agree(first, second, Between(0.0, 0.0, 0.0))
         segment = self._course.history.between(a, b)
-        turned = float(((segment.omega_rad_s - at.x[es.GYRO_BIAS]) * segment.span_s).sum())
+        turned = float(((segment.rate_rad_s - at.x[es.GYRO_BIAS]) * segment.span_s).sum())
         null_sigma = math.sqrt(at.P[es.GYRO_BIAS, es.GYRO_BIAS])
         return fixes_agree(first, second, Between(b - a, turned, null_sigma))
 

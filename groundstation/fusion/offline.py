@@ -68,9 +68,9 @@ class OfflineSmoother:
         """Say which accelerometers are not believed from this stamp on."""
         self._filter.doubt_forces(t_ns, x=x, y=y)
 
-    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+    def expected_forces(self, rate_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
         """Return what the accelerometers would read under a known push."""
-        return self._filter.expected_forces(omega_rad_s, push_m_s2, turn_rad_s2)
+        return self._filter.expected_forces(rate_rad_s, push_m_s2, turn_rad_s2)
 
     def slope_left(self) -> tuple[float, float]:
         """Return the table's pull beyond the map, causal."""
@@ -95,7 +95,7 @@ class OfflineSmoother:
         state = smoothed.state[rows]
         state[:, :2] += off * state[:, 3:5]
         state[:, 2:3] += off * state[:, 5:6]
-        values, sigmas = state.tolist(), smoothed.std[rows].tolist()
+        values, sigmas = state.tolist(), smoothed.sigma[rows].tolist()
         return [
             None if row < 0 or value[0] != value[0] else PlanarState._make([t_ns, *value, *sigma, False])
             for (t_ns, _, row), value, sigma in zip(self._rows, values, sigmas, strict=True)

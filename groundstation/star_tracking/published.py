@@ -94,15 +94,15 @@ class PublishedTracker:
         maps, stars = len(centre), len(np.unique(star))
         mixed = (maps - 1 + MIN_CLUSTER) * stars
         passed_m2 = (0.25 * CLUSTER_RADIUS_M) ** 2
-        cov = np.zeros((3, 3))
-        cov[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
-        cov[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
+        covariance = np.zeros((3, 3))
+        covariance[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
+        covariance[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
         star, first = np.unique(star, return_index=True)
         return StarFix(
             x_m=float(origin.real),
             y_m=float(origin.imag),
             heading_rad=float(np.angle(turn)),
-            cov=cov,
+            covariance=covariance,
             stars=len(star),
             mode=Mode.PUBLISHED,
             spot_index=spot[first],

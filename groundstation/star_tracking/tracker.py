@@ -42,7 +42,7 @@ class StarTracker:
         self.catalogue = catalogue
         self.rays = CeilingRays(camera)
         tolerance_m = self.settings.tolerance_px * self.rays.scale_m_px
-        tolerance_m += 2.0 * float(np.median(catalogue.std_m))
+        tolerance_m += 2.0 * float(np.median(catalogue.sigma_m))
         self.sky = SkyIndex(catalogue, tolerance_m, self.rays.reach_m)
         self._is_dropped = np.zeros(len(catalogue) + 1, dtype=bool)  # one more: the star that is none
         self._search = Search(self.sky, self.rays, self.settings, self._is_dropped)
@@ -78,7 +78,7 @@ class StarTracker:
             return NoFix(Refusal.BLURRED, f"{n} spots, most of them streaks.", n)
         if motion is not None and self.settings.exposure_s > 0.0:
             path_m = math.hypot(motion.vx_table_m_s, motion.vy_table_m_s)
-            path_m += 0.5 * self.rays.reach_m * abs(motion.omega_rad_s)
+            path_m += 0.5 * self.rays.reach_m * abs(motion.rate_rad_s)
             streak_px = path_m * self.settings.exposure_s / self.rays.scale_m_px
             if streak_px > _LONG_STREAK_PX:
                 return NoFix(Refusal.BLURRED, f"{n} spots; stars are streaks of {streak_px:.0f} px.", n)

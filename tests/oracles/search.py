@@ -67,8 +67,8 @@ class OracleSearch:
 
     def _track(self, sighting: Sighting, prior: PosePrior) -> StarFix | None:
         turn, shift = np.exp(1j * prior.heading_rad), complex(prior.x_table_m, prior.y_table_m)
-        sigma = math.sqrt(max(prior.cov[0, 0], prior.cov[1, 1]))
-        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.cov[2, 2]))
+        sigma = math.sqrt(max(prior.covariance[0, 0], prior.covariance[1, 1]))
+        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.covariance[2, 2]))
         gate = min(3.0 * sigma + 2.0 * self._sky.tolerance_m, 0.1)
         return self._settler.settle(sighting, turn, shift, gate, prior)
 

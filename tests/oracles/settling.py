@@ -83,8 +83,8 @@ class Settler:
             spot, star = self._match(q, turn, shift, gate_m)
             if len(spot) < needed:
                 return None
-            cov = self._covariance(spots, points, spot, star)
-            pose = refine(q[spot], self._sky.position_m[star], cov, turn, shift)
+            covariance = self._covariance(spots, points, spot, star)
+            pose = refine(q[spot], self._sky.position_m[star], covariance, turn, shift)
             turn, shift = pose.turn, pose.shift_m
             if gate_m <= 1.5 * tolerance_m:
                 break
@@ -102,7 +102,7 @@ class Settler:
             x_m=shift.real,
             y_m=shift.imag,
             heading_rad=float(np.angle(turn)),
-            cov=pose.cov,
+            covariance=pose.covariance,
             stars=int(kept.sum()),
             mode=Mode.LOST_IN_SPACE if prior is None else Mode.TRACKING,
             spot_index=spot[kept],
@@ -145,11 +145,11 @@ class Settler:
         variance_px2 = self._settings.centre_floor_px**2 + self._settings.streak_floor_ratio**2 * length2
         floor = variance_px2[:, None] * np.array([1.0, 0.0, 1.0])
         chosen = CeilingPoints(points.q_body_m[spot], points.jacobian_m_px[spot])
-        cov = spot_covariance(chosen, spots.cov_px2[spot] + floor)
+        covariance = spot_covariance(chosen, spots.covariance_px2[spot] + floor)
         variance = self._sky.variance_m2[star]
-        cov[:, 0, 0] += variance
-        cov[:, 1, 1] += variance
-        return cov
+        covariance[:, 0, 0] += variance
+        covariance[:, 1, 1] += variance
+        return covariance
 
     def _evidence(
         self, q: Complex, distance: NDArray[np.float64], spots: int, prior: PosePrior | None, pose: Pose
@@ -163,7 +163,7 @@ class Settler:
                     float(np.angle(pose.turn * np.exp(-1j * prior.heading_rad))),
                 ]
             )
-            spread = prior.cov + pose.cov
+            spread = prior.covariance + pose.covariance
             determinant = float(np.linalg.det(spread))
             if not determinant > 0.0:
                 return -math.inf  # a prior that is none

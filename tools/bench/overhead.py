@@ -76,7 +76,7 @@ def _look(view: TableView, tracker: OverheadTracker, frames: int, half_m: float,
                 off = np.array([answer.x_m, answer.y_m, answer.heading_rad]) - pose
                 off[2] = np.angle(np.exp(1j * off[2]))
                 found.off.append(off)
-                found.ratios.append(float(off @ np.linalg.solve(answer.cov, off)) / 3.0)
+                found.ratios.append(float(off @ np.linalg.solve(answer.covariance, off)) / 3.0)
     return found
 
 

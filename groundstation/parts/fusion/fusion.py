@@ -102,7 +102,7 @@ class Fusion(Node):
         biases = (
             (0.0, 0.0, 0.0)
             if state is None
-            else (state.bias_omega_rad_s, state.bias_ax_m_s2, state.bias_ay_m_s2)
+            else (state.bias_rate_rad_s, state.bias_ax_m_s2, state.bias_ay_m_s2)
         )
         yield FusionStatus(
             now_ns,
@@ -147,7 +147,7 @@ class Fusion(Node):
     def _correct(self, fix: PoseFix, source: str, now_ns: int) -> Iterator[Message]:
         covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
-            motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.omega_rad_s])
+            motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.rate_rad_s])
             covariance += fix.stamp_sigma_s**2 * np.outer(motion, motion)
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
@@ -199,8 +199,8 @@ class Fusion(Node):
             (state.x_m, state.y_m),
             wrap_angle(state.heading_rad),
             (state.vx_m_s, state.vy_m_s),
-            state.omega_rad_s,
-            (state.std_x_m, state.std_y_m, state.std_heading_rad),
+            state.rate_rad_s,
+            (state.sigma_x_m, state.sigma_y_m, state.sigma_heading_rad),
             _status(state),
             self._fix_stamp_ns,
         )

@@ -77,8 +77,8 @@ class OverheadTracker(Node):
                 answer.x_m,
                 answer.y_m,
                 wrap_angle(answer.heading_rad),
-                tuple(answer.cov.ravel().tolist()),
-                self._delay.delay_std_s,
+                tuple(answer.covariance.ravel().tolist()),
+                self._delay.delay_sigma_s,
                 answer.circles,
                 answer.whole,
                 answer.misfit_m,
@@ -88,5 +88,5 @@ class OverheadTracker(Node):
     def _refusal(self, stamp_ns: int, vehicle: str, reason: str) -> OverheadFix:
         nan = math.nan
         return OverheadFix(
-            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._delay.delay_std_s, 0, 0, nan, reason
+            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._delay.delay_sigma_s, 0, 0, nan, reason
         )

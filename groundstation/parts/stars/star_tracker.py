@@ -117,7 +117,7 @@ class StarTracker(Node):
     def _exposure(self, spots: StarSpots) -> tuple[int, float]:
         """Middle of the exposure and its standard deviation: from the driver's stamp where there is one."""
         stamp_ns = spots.device_stamp_ns or spots.stamp_ns
-        return self._delay.middle_ns(stamp_ns), self._delay.delay_std_s
+        return self._delay.middle_ns(stamp_ns), self._delay.delay_sigma_s
 
     def _explain(
         self,
@@ -139,5 +139,5 @@ class StarTracker(Node):
         if motion is None:
             return False
         speed_m_s = abs(complex(motion.vx_table_m_s, motion.vy_table_m_s))
-        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.omega_rad_s)
+        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.rate_rad_s)
         return speed_m_s * readout_s < _STILL_M

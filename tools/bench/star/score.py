@@ -86,11 +86,11 @@ class Score:
         if frame.pose is None:
             self.dark_ms.append(detect_ms + solve_ms)
         if isinstance(answer, StarFix):
-            self._judge(frame, (answer.x_m, answer.y_m, answer.heading_rad), answer.cov)
+            self._judge(frame, (answer.x_m, answer.y_m, answer.heading_rad), answer.covariance)
         else:
             self._judge(frame, None if isinstance(answer, NoFix) else answer, None)
 
-    def _judge(self, frame: Frame, answer: Answer | None, cov: NDArray[np.float64] | None) -> None:
+    def _judge(self, frame: Frame, answer: Answer | None, covariance: NDArray[np.float64] | None) -> None:
         if frame.pose is None:
             self.false += answer is not None
             return
@@ -99,8 +99,8 @@ class Score:
             error[2] = np.angle(np.exp(1j * error[2]))
             if np.hypot(error[0], error[1]) <= GATE_M and abs(error[2]) <= GATE_RAD:
                 self.errors.append((frame.tag, error))
-                if cov is not None:
-                    self.chi2.append(float(error @ np.linalg.solve(cov, error)) / 3.0)
+                if covariance is not None:
+                    self.chi2.append(float(error @ np.linalg.solve(covariance, error)) / 3.0)
                 return
             self.false += 1
         self.missed.append(frame.tag)

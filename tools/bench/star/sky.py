@@ -98,7 +98,7 @@ def _survey(laboratory: Laboratory, camera: CameraCalibration) -> list[Row]:
     similarity = (wanted * np.conj(centred)).sum() / (np.abs(centred) ** 2).sum()
     error = similarity * centred - wanted
     rms_mm = 1e3 * float(np.sqrt((np.abs(error) ** 2).mean()))
-    ratio = float(np.sqrt(np.mean((np.column_stack((error.real, error.imag)) / sky.std_m[real]) ** 2)))
+    ratio = float(np.sqrt(np.mean((np.column_stack((error.real, error.imag)) / sky.sigma_m[real]) ** 2)))
     note = f"{int(real.sum())} of {len(true)} LEDs, {int((~real).sum())} others, {len(poses)} pictures"
     return [
         at_most("star: survey of the LEDs, RMS after the best similarity", rms_mm, 0.3, 0.1, "mm", note),
@@ -135,7 +135,7 @@ def _lens(laboratory: Laboratory, camera: CameraCalibration, catalogue: StarCata
         cy=0.5 * (camera.height - 1),
         distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    found = calibrate_intrinsics(pictures, catalogue, wrong, wobble_std_m=2e-5)
+    found = calibrate_intrinsics(pictures, catalogue, wrong, wobble_sigma_m=2e-5)
     frames = list(laboratory.frames("easy", PICTURES))
     known = run(frames, StarTracker(catalogue, camera).solve).position_mm("easy")
     ours = run(frames, StarTracker(catalogue, found.camera).solve).position_mm("easy")

@@ -8,9 +8,7 @@ def test_it_testifies_to_the_last_moments_and_forgets_what_was_before():
     witness = Witness()
     period_ns = 10_000_000
     for sequence in range(1, 101):
-        witness.keep(
-            Envelope(VehicleState.TOPIC, "alpha", sequence, sequence * period_ns), bytes([sequence])
-        )
+        witness.keep(Envelope(VehicleState.TOPIC, "alpha", sequence, sequence * period_ns), bytes([sequence]))
     record = RecordWriter()
     witness.testify(record)
     found = list(read_batch(record.take()))

@@ -33,8 +33,8 @@ def test_the_rolling_shutter_term_takes_out_what_the_rows_saw_later(painter, cat
     without, with_term = [], []
     for _ in range(6):
         pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.7), rng.uniform(-3, 3))
-        direction, omega = rng.uniform(-np.pi, np.pi), rng.uniform(-1.0, 1.0)
-        velocity = (0.5 * np.cos(direction), 0.5 * np.sin(direction), omega)
+        direction, rate = rng.uniform(-np.pi, np.pi), rng.uniform(-1.0, 1.0)
+        velocity = (0.5 * np.cos(direction), 0.5 * np.sin(direction), rate)
         spots = detect(painter.paint(rng, pose, velocity, exposure_s=0.005, readout_s=0.025))
         without.append(error_mm(plain.solve(spots), pose))
         with_term.append(error_mm(aware.solve(spots, motion=BodyMotion(*velocity)), pose))

@@ -21,9 +21,9 @@ def spots_of(painter, rng, stars_m, pose):
     inside = (uv > 4.0).all(axis=1) & (uv < (635.0, 475.0)).all(axis=1)
     uv = uv[inside] + rng.normal(0.0, 0.03, (int(inside.sum()), 2))
     n = len(uv)
-    cov = np.tile([0.03**2, 0.0, 0.03**2], (n, 1))
+    covariance = np.tile([0.03**2, 0.0, 0.03**2], (n, 1))
     light = np.linspace(900, 300, n)
-    return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
 
 
 @pytest.mark.parametrize("make", [StarTracker, oracle_tracker])
@@ -39,7 +39,7 @@ def test_rows_and_columns_of_leds_are_refused_in_words(painter, camera, make):
         assert "More than one place" in answer.detail
         assert answer.guess is not None
         # What is believed beforehand may decide between the places.
-        fix = tracker.solve(spots, PosePrior(*pose, cov=np.diag([1e-4] * 3)))
+        fix = tracker.solve(spots, PosePrior(*pose, covariance=np.diag([1e-4] * 3)))
         assert isinstance(fix, StarFix)
 
 

@@ -17,12 +17,12 @@ def tracker(catalogue, camera):
 def spots_at(uv, sigma_px=0.03):
     """Spots without a picture: centres with a known error."""
     n = len(uv)
-    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
     return Spots(
         uv[:, 0].copy(),
         uv[:, 1].copy(),
         np.linspace(900, 300, n),
-        cov,
+        covariance,
         np.ones(n),
         np.zeros((n, 2)),
         10.0,
@@ -117,7 +117,7 @@ def test_the_reported_covariance_is_the_error_s(painter, tracker):
         uv = painter.project(*pose)[seen] + rng.normal(0.0, 0.05, (len(seen), 2))
         fix = tracker.solve(spots_at(uv, sigma_px=0.05))
         error = pose_error(fix, pose)
-        ratios.append(error @ np.linalg.solve(fix.cov, error) / 3.0)
+        ratios.append(error @ np.linalg.solve(fix.covariance, error) / 3.0)
     assert 0.8 < np.mean(ratios) < 1.25
 
 
@@ -168,4 +168,4 @@ def test_the_same_picture_gives_the_same_fix_bit_for_bit(painter, tracker):
     image = painter.paint(rng, (2.2, 1.9, -2.0))
     one, two = tracker.solve(detect(image)), tracker.solve(detect(image))
     assert (one.x_m, one.y_m, one.heading_rad) == (two.x_m, two.y_m, two.heading_rad)
-    assert np.array_equal(one.cov, two.cov)
+    assert np.array_equal(one.covariance, two.covariance)
