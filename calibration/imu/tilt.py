@@ -12,13 +12,13 @@ import numpy as np
 
 from calibration.imu.figures import draw_tilt
 from calibration.imu.procedures import words_of
-from calibration.imu.rests import find_rests
+from calibration.imu.rest_search import find_rests
 from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import NotARest, zero_offset
 from calibration.outcome import Outcome
 from calibration.result import Quantity
 from groundstation.declarations.errors import UsageError
-from groundstation.files.tables import load_table
+from groundstation.files.number_tables import load_table
 from groundstation.fusion.flight_data import Array, FlightData
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2

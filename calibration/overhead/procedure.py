@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.outcome import Outcome
+from calibration.overhead.camera_pose import POSE, BoardView, OverheadPose, calibrate_overhead_pose
 from calibration.overhead.figures import draw_board_pose
-from calibration.overhead.pose import POSE, BoardView, OverheadPose, calibrate_overhead_pose
 from calibration.result import Quantity
 from groundstation.overhead.overhead_camera import OverheadCamera
 

@@ -9,8 +9,8 @@ from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.sky.amendment import Amendment, NewPlace, propose
 from calibration.sky.star_list import COLUMNS, star_list_text, star_row
 from groundstation.declarations.errors import UsageError
+from groundstation.files.number_tables import Table, parse_table
 from groundstation.files.reading import read_bytes, text_of
-from groundstation.files.tables import Table, parse_table
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.stars import messages as stars
 from groundstation.parts.stars.star_answers import change_of

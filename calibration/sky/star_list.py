@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from groundstation.files.tables import csv_text
+from groundstation.files.number_tables import csv_text
 
 COLUMNS = ("id", "x_m", "y_m", "std_x_m", "std_y_m", "times_seen")
 

@@ -17,9 +17,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from drivers.imu_block.block_frames import TICK_NS, ImuFrame
 from drivers.imu_block.frame_v1 import V1_WIRE_BYTES
 from drivers.imu_block.frame_v2 import V2_WIRE_BYTES
-from drivers.imu_block.frames import TICK_NS, ImuFrame
 from drivers.imu_block.lower_envelope import BLOCK_NS, DRIFT_LIMIT, LowerEnvelope
 
 FTDI_PACKET_BYTES = 62

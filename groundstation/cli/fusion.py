@@ -16,10 +16,10 @@ from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, FixAccount, PlanarState
+from groundstation.fusion.estimators import ESTIMATORS
 from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.slope_grid import noise_with, slope_grid
 from groundstation.fusion.table_map import TableMap
 

@@ -11,11 +11,11 @@ import typer
 from groundstation.cli.progress import with_progress
 from groundstation.data_sets.star_folder import find_frames, read_frame
 from groundstation.files.errors import FileError
-from groundstation.files.tables import csv_text
+from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, write_file
+from groundstation.overhead.circle_tracker import NoOverheadFix, OverheadFix, OverheadTracker
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
 
 COLUMNS = (
     "frame",

@@ -19,7 +19,7 @@ from groundstation.cli.progress import with_progress
 from groundstation.cli.star_pictures import PictureFolder
 from groundstation.data_sets.star_folder import find_frames, load_sky, read_frame
 from groundstation.declarations.errors import UsageError
-from groundstation.files.tables import csv_text
+from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, whole_folder, write_file
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect

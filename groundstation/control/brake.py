@@ -9,9 +9,9 @@ import math
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.state import ControlState, Wrench, limit_length, rotate
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
 

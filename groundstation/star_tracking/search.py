@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.core.library import default_core
-from groundstation.star_tracking import settings as constants
+from groundstation.star_tracking import tracker_settings as constants
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
 from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 
 _ROOM = 128  # spots to begin with; more come seldom
 

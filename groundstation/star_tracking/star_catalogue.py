@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.files.errors import FileError
+from groundstation.files.number_tables import parse_table
 from groundstation.files.reading import read_bytes
-from groundstation.files.tables import parse_table
 
 MIN_STARS = 4
 """Below this no frame could be identified without a prior."""

@@ -10,9 +10,9 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.search import Found, Search
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.star_catalogue import StarCatalogue
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 
 __all__ = ["StarTracker", "TrackerSettings"]
 

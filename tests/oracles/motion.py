@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.fixes import BodyMotion
-from groundstation.star_tracking.settings import (
+from groundstation.star_tracking.tracker_settings import (
     MAX_MISFIT_RATIO,
     MIN_STREAK_PX,
     MIN_STREAK_SHARE,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
+from groundstation.star_tracking.tracker_settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]

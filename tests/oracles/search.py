@@ -11,10 +11,10 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, PosePrior, StarFix
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
 from groundstation.star_tracking.search import Found
-from groundstation.star_tracking.settings import NEIGHBOUR_RANKS, RANK_GROUPS, TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
+from groundstation.star_tracking.tracker_settings import NEIGHBOUR_RANKS, RANK_GROUPS, TrackerSettings
 from oracles.hypotheses import Poses, pair_poses, spot_triangles, triangle_poses
 from oracles.motion import smear_from_streaks, unbend
 from oracles.settling import Settler, Sighting

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays, spot_covariance
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 from oracles.evidence import Chance, evidence_nats
 from oracles.motion import row_delays_s, smear_from_motion, to_middle_row, unbend
 from oracles.refinement import Pose, refine

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from pydantic import BaseModel, ConfigDict, Field
 
 from groundstation.control.controller import NO_NEIGHBOURS
-from groundstation.control.envelope import WrenchEnvelope
+from groundstation.control.controllers import ControllerRow
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.registry import ControllerRow
 from groundstation.control.state import ControlState, Goal, Wrench, clamp, limit_length, rotate
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
 LARGEST_ERROR_M, LARGEST_ERROR_RAD = 0.1, 0.2

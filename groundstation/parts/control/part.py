@@ -5,13 +5,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from groundstation.control.registry import ControllerRow, controllers
+from groundstation.control.controllers import ControllerRow, controllers
 from groundstation.control.state import Goal
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.parts.control.actions import GO_TO
-from groundstation.parts.control.controller import Controller
+from groundstation.parts.control.controller_node import Controller
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
+from drivers.imu_block.block_commands import encode_identify, encode_set_averaging
 from drivers.imu_block.clock import TickClock, TickStamp
-from drivers.imu_block.commands import encode_identify, encode_set_averaging
 from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame
 from drivers.imu_block.sensors import (
     Environment,

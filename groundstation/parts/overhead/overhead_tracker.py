@@ -12,7 +12,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig_file import RigFile
 from groundstation.frames import wrap_angle
-from groundstation.overhead import tracker as overhead
+from groundstation.overhead import circle_tracker as overhead
 from groundstation.overhead.liveries import parse_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.parts.operation.messages import CalibrationInUse

@@ -12,10 +12,10 @@ from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import LABORATORY, Rig
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.parts.valves.actions import FLOAT_AIR, GUARD, MULTIPLEXER
-from groundstation.parts.valves.allocation import Allocation
-from groundstation.parts.valves.command_mux import CommandMux
+from groundstation.parts.valves.allocation_node import Allocation
+from groundstation.parts.valves.command_mux_node import CommandMux
 from groundstation.parts.valves.gauges import GAUGES
-from groundstation.parts.valves.guard import Guard
+from groundstation.parts.valves.guard_node import Guard
 from groundstation.parts.valves.messages import (
     CanIn,
     CanOut,

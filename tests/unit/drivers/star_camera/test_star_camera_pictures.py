@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.star_camera.camera_frame import CameraFrame
 from drivers.star_camera.exposure import ExposureDelay
-from drivers.star_camera.frame import CameraFrame
 from drivers.star_camera.multipart import PartParser, boundary_of
 from drivers.star_camera.picture import decode_picture, to_mono
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from groundstation.control.allocation import MAX_VALVES, Allocator
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.state import Wrench
 from groundstation.control.vehicle import Valve, VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 SQUARE = VehicleModel(11.0, 0.25, square_of_eight())
 # six valves in three tangential pairs at 120 degrees, of unlike thrust: no symmetry to lean on

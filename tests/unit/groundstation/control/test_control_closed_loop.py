@@ -7,13 +7,13 @@ import pytest
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
 from groundstation.control.edge import edge_outlook
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.formation import Formation, FormationConfig, RelativePose
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import rectangle
 from groundstation.control.modulation import PulseConfig
 from groundstation.control.state import ControlState, Goal
 from groundstation.control.station import StationConfig, StationKeeping
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 HERE = Goal((0.0, 0.0), 0.3)
 SETTLED_S = 20.0

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.registry import controllers, make_controller
+from groundstation.control.controllers import controllers, make_controller
 from groundstation.control.state import ControlState, Goal, Wrench
 from groundstation.control.vehicle import VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 VEHICLE = VehicleModel(11.0, 0.25, square_of_eight())
 ENVELOPE = WrenchEnvelope(VEHICLE)

@@ -9,9 +9,9 @@ import pytest
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import ALBEDO, Body, Light, TableView
 from groundstation.overhead.arcs import circles_of_rim
+from groundstation.overhead.circle_tracker import NoOverheadFix, OverheadFix, OverheadTracker
 from groundstation.overhead.liveries import Circle, Livery, load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
 
 FILES = Path(__file__).parents[4] / "calibration" / "rigs" / "emulated"
 TABLE_M = (-2.0, 2.0, -1.5, 1.5)

@@ -12,7 +12,7 @@ from groundstation.control.mux import MuxConfig
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.valves.command_mux import CommandMux
+from groundstation.parts.valves.command_mux_node import CommandMux
 from groundstation.parts.valves.messages import ValveDemand
 
 MS = 1_000_000

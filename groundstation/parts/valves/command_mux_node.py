@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
 from groundstation.control.edge import EdgeVerdict, edge_outlook
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux as Choice
@@ -12,6 +11,7 @@ from groundstation.control.mux import MuxConfig, Selection, Source
 from groundstation.control.state import ControlState
 from groundstation.control.state import Wrench as BodyWrench
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
