@@ -30,7 +30,7 @@ from calibration.sky.sky_adjustment import (
 )
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import ceiling_points
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
@@ -162,7 +162,7 @@ def _calibrate(
     for tolerance in _TOLERANCES_PX:
         tracker = StarTracker(catalogue, camera, _settings(tolerance))
         answers = [(i, tracker.solve(spots)) for i, spots in enumerate(pictures)]
-        fixes = [(i, fix) for i, fix in answers if isinstance(fix, StarFix)]
+        fixes = [(i, fix) for i, fix in answers if isinstance(fix, PictureFix)]
         if len(fixes) < _MIN_PICTURES:
             raise SkyCalibrationError(
                 f"{len(fixes)} of {len(pictures)} pictures could be solved, {_MIN_PICTURES} are needed"
@@ -198,7 +198,7 @@ def _rough_focal_length(
         scaled = replace(camera, fx=scale * camera.fx, fy=scale * camera.fy)
         tracker = StarTracker(catalogue, scaled, _settings(_TOLERANCES_PX[0]))
         answers = (tracker.solve(spots) for spots in some)
-        stars = sum(answer.stars for answer in answers if isinstance(answer, StarFix))
+        stars = sum(answer.stars for answer in answers if isinstance(answer, PictureFix))
         if stars > most:
             best, most = scaled, stars
     return best
@@ -206,7 +206,7 @@ def _rough_focal_length(
 
 def _matches(
     pictures: Sequence[Spots],
-    fixes: Sequence[tuple[int, StarFix]],
+    fixes: Sequence[tuple[int, PictureFix]],
     star_m: Array,
     camera: CameraCalibration,
     gate_px: float,

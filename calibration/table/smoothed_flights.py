@@ -16,7 +16,7 @@ from calibration.outcome import CalibrationRefusedError
 from calibration.table.flight_log import FlightLog
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
-from groundstation.fusion.estimator import Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
@@ -50,7 +50,7 @@ class _Tap(OfflineSmoother):
         super().__init__(noise)
         self.packets: list[ImuPacket] = []
         self.fixes: list[Fix] = []
-        self.accounts: dict[int, FixAccount] = {}
+        self.accounts: dict[int, FixOutcome] = {}
         self.rests_ns: list[tuple[int, int | None]] = []
 
     def begin_rest(self, t_ns: int) -> None:
@@ -67,13 +67,13 @@ class _Tap(OfflineSmoother):
         self.packets.append(packet)
         return super().add_imu(packet)
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         account = super().add_fix(fix)
         self.fixes.append(fix)
         self.accounts[account.t_exposure_ns] = account
         return account
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         late = super().settled()
         self.accounts.update((account.t_exposure_ns, account) for account in late)
         return late

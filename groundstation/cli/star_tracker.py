@@ -23,7 +23,7 @@ from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, whole_folder, write_file
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
-from groundstation.star_tracking.fixes import NoFix, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix
 from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
@@ -104,7 +104,7 @@ def solve(
 
 def _solver(
     method: Method, camera: CameraCalibration, catalogue: StarCatalogue
-) -> Callable[[NDArray[np.uint8]], StarFix | NoFix]:
+) -> Callable[[NDArray[np.uint8]], PictureFix | NoFix]:
     if method is Method.PUBLISHED:
         published = PublishedTracker(catalogue, camera)
         return lambda image: published.solve(detect(image))
@@ -112,7 +112,7 @@ def _solver(
     return lambda image: tracker.solve(detector.find(image))
 
 
-def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
+def _row(frame: str, answer: PictureFix | NoFix, ms: float) -> list[str]:
     if isinstance(answer, NoFix):
         return [frame, "0", "", "", "", f"{ms:.3f}", "0", "", "", "", answer.reason.value]
     pose = (answer.x_m, answer.y_m, answer.heading_rad)

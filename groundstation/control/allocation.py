@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.control.state import Wrench
+from groundstation.control.state import BodyWrench
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 
@@ -45,7 +45,7 @@ class Allocator:
         self._fixed = np.array([fixed for _, _, fixed, _ in candidates])
         self._fixed_count = self._fixed.sum(axis=1)
 
-    def allocate(self, wrench: Wrench, *, sparse: bool = False) -> NDArray[np.float64]:
+    def allocate(self, wrench: BodyWrench, *, sparse: bool = False) -> NDArray[np.float64]:
         """Duties that make the wrench (shortened by the envelope where it must be) with the least gas.
 
         Args:

@@ -12,7 +12,7 @@ import math
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.checkpoint import Course
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.fix_judge import FixJudge
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
@@ -104,13 +104,13 @@ class ErrorStateFilter:
             self._integrate_to_now()
         return reckoner.report() if reckoner.has_pose else None
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix at its arrival and give account of it."""
         account = self._judge.add(fix)
         self._follow()
         return account
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets."""
         return self._judge.settled()
 

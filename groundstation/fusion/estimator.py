@@ -72,7 +72,7 @@ class PlanarState(NamedTuple):
     """True until two fixes agree, and again when fixes in a row contradict the estimate."""
 
 
-class FixAccount(NamedTuple):
+class FixOutcome(NamedTuple):
     """What became of one fix."""
 
     t_exposure_ns: int
@@ -114,10 +114,10 @@ class Estimator(Protocol):
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Take one packet; None as long as no fix has given a pose, or when the packet was refused."""
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix, at its arrival."""
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets, once each."""
 
     def state(self) -> PlanarState | None:

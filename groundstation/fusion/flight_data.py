@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.stamp_ticks import StampTicks
 
@@ -55,7 +55,7 @@ class FlightData:
 
 def estimate(
     data: FlightData, estimator: Estimator, progress: Callable[[float], None] | None = None
-) -> tuple[list[PlanarState | None], list[FixAccount]]:
+) -> tuple[list[PlanarState | None], list[FixOutcome]]:
     """Feed a flight to an estimator in the order in which it arrived.
 
     Args:
@@ -68,7 +68,7 @@ def estimate(
     """
     ticks = StampTicks(data.noise.packet_period_s)
     stars, next_fix = data.stars.tolist(), 0
-    accounts: list[FixAccount] = []
+    accounts: list[FixOutcome] = []
     states: list[PlanarState | None] = []
     resting = data.run_start_s > 0.0
     if resting:
@@ -95,7 +95,7 @@ def estimate(
     return states, _merge(accounts, estimator.settled())
 
 
-def _add_fix(estimator: Estimator, row: list[float], covariance: Array) -> FixAccount:
+def _add_fix(estimator: Estimator, row: list[float], covariance: Array) -> FixOutcome:
     exposure, arrival, x, y, heading = row
     if exposure - exposure != 0.0:
         estimator.counters.add("fix_stamp_not_finite")
@@ -103,12 +103,12 @@ def _add_fix(estimator: Estimator, row: list[float], covariance: Array) -> FixAc
     return estimator.add_fix(Fix(round(exposure * NS), round(arrival * NS), x, y, heading, covariance))
 
 
-def _refused(row: list[float], reason: str) -> FixAccount:
+def _refused(row: list[float], reason: str) -> FixOutcome:
     stamp = round(row[0] * NS) if math.isfinite(row[0]) else 0
-    return FixAccount(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
+    return FixOutcome(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
 
 
-def _merge(accounts: list[FixAccount], settled: list[FixAccount]) -> list[FixAccount]:
+def _merge(accounts: list[FixOutcome], settled: list[FixOutcome]) -> list[FixOutcome]:
     """Replace the account of a fix that waited by the one given when it was settled."""
     later = {account.t_exposure_ns: account for account in settled}
     return [

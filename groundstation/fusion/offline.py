@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.smoother import Smoothed, smooth
@@ -48,11 +48,11 @@ class OfflineSmoother:
         self._rows.append((packet.t_ns, self._filter.stamp_off_s if row >= 0 else 0.0, row))
         return state
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix."""
         return self._filter.add_fix(fix)
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait."""
         return self._filter.settled()
 

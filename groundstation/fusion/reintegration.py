@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offset_fit import fit_offsets
@@ -49,7 +49,7 @@ class ReintegrationEstimator:
         self._rate = 0.0
         self._last = (0.0, 0.0, 0.0)
         self._waiting: list[Fix] = []
-        self._accounts: list[FixAccount] = []
+        self._accounts: list[FixOutcome] = []
 
     def begin_rest(self, t_ns: int) -> None:
         """Say that from this stamp the vehicle stands still."""
@@ -164,12 +164,12 @@ class ReintegrationEstimator:
         C[:3, :3] = np.diag([xy, xy, heading])
         return C
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets."""
         accounts, self._accounts = self._accounts, []
         return accounts
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Put the vehicle where the fix saw it, and integrate the packets since."""
         t = self._seconds(fix.t_exposure_ns)
         complaint = complaint_about(fix)
@@ -200,7 +200,7 @@ class ReintegrationEstimator:
             self._fixes = self._fixes[-2:]
         return self._used(fix, predicted)
 
-    def _used(self, fix: Fix, predicted: list[float] | None) -> FixAccount:
+    def _used(self, fix: Fix, predicted: list[float] | None) -> FixOutcome:
         account = self._account(fix, "used")
         if predicted is None:
             return account
@@ -245,11 +245,11 @@ class ReintegrationEstimator:
             segment.ay_m_s2.tolist(),
         ]
 
-    def _account(self, fix: Fix, reason: str) -> FixAccount:
+    def _account(self, fix: Fix, reason: str) -> FixOutcome:
         if reason != "used":
             self.counters.add("fix_" + reason.replace(" ", "_"))
         nan = math.nan
-        return FixAccount(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan, fix.source)
+        return FixOutcome(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan, fix.source)
 
     def _lever(self, theta: float) -> tuple[float, float]:
         c, s = math.cos(theta), math.sin(theta)

@@ -53,7 +53,7 @@ class BodyMotion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StarFix:
+class PictureFix:
     """A pose with its covariance and its witnesses.
 
     Attributes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior
 
 _DISAGREEMENT = 21.1  # chi-square of three, 1 in 10,000
 
@@ -47,7 +47,7 @@ class PriorGovernor:
         )  # written so that a covariance of NaN is vague
         return None if vague else prior
 
-    def note(self, answer: StarFix | NoFix, prior: PosePrior | None = None) -> None:
+    def note(self, answer: PictureFix | NoFix, prior: PosePrior | None = None) -> None:
         """Learn what became of a picture.
 
         Args:
@@ -66,7 +66,7 @@ class PriorGovernor:
             self._is_confirmed = False
 
 
-def disagreement(fix: StarFix, prior: PosePrior) -> float:
+def disagreement(fix: PictureFix, prior: PosePrior) -> float:
     """Give the squared Mahalanobis distance of a fix from a prior that does not contain it."""
     turn = fix.heading_rad - prior.heading_rad
     off = np.array(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from groundstation.core.library import default_core
 from groundstation.star_tracking import tracker_settings as constants
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, PictureFix, PoseGuess, PosePrior
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.tracker_settings import TrackerSettings
@@ -38,7 +38,7 @@ class Found:
         is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
     """
 
-    fix: StarFix | None
+    fix: PictureFix | None
     best_nats: float
     best_guess: PoseGuess | None
     is_ambiguous: bool = False
@@ -103,7 +103,7 @@ class Search:
             guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
             return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
         stars = picture.stars
-        fix = StarFix(
+        fix = PictureFix(
             x_m=picture.x_m,
             y_m=picture.y_m,
             heading_rad=picture.heading_rad,

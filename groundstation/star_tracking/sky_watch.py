@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import CeilingRays, spot_covariance
 from groundstation.star_tracking.sky_change import Change, Place, SkyChange
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -116,7 +116,7 @@ class SkyWatch:
         rows[list(self._moved)] = True
         return np.flatnonzero(rows)
 
-    def note(self, fix: StarFix, spots: Spots) -> list[SkyChange]:
+    def note(self, fix: PictureFix, spots: Spots) -> list[SkyChange]:
         """Learn from one fix and its spots; give what is newly found."""
         if fix.stars < self._settings.min_stars or len(spots) == 0:
             return []
@@ -220,7 +220,7 @@ class SkyWatch:
         noise = 0.5 * float(np.mean(self._square[known] / self._weight[known]))
         return floor + max(spread - noise, 0.0)
 
-    def _shows(self, fix: StarFix, places: Complex) -> NDArray[np.bool_]:
+    def _shows(self, fix: PictureFix, places: Complex) -> NDArray[np.bool_]:
         """Tell which places of the ceiling lie well inside the picture."""
         turn_back = complex(math.cos(fix.heading_rad), -math.sin(fix.heading_rad))
         return self._view.shows(turn_back * (places - complex(fix.x_m, fix.y_m)))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.search import Found, Search
 from groundstation.star_tracking.sky_index import SkyIndex
@@ -54,7 +54,7 @@ class StarTracker:
 
     def solve(
         self, spots: Spots, prior: PosePrior | None = None, motion: BodyMotion | None = None
-    ) -> StarFix | NoFix:
+    ) -> PictureFix | NoFix:
         """Give the pose at the exposure, or say why there is none.
 
         Args:

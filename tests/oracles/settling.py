@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, PictureFix, PoseGuess, PosePrior
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays, spot_covariance
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.tracker_settings import TrackerSettings
@@ -63,7 +63,7 @@ class Settler:
 
     def settle(
         self, sighting: Sighting, turn: complex, shift: complex, gate_m: float, prior: PosePrior | None
-    ) -> StarFix | None:
+    ) -> PictureFix | None:
         """Refine a candidate and put it to the test.
 
         Args:
@@ -98,7 +98,7 @@ class Settler:
         if not nats >= self._settings.evidence_nats or int(pose.kept.sum()) < needed:
             return None
         kept = pose.kept
-        return StarFix(
+        return PictureFix(
             x_m=shift.real,
             y_m=shift.imag,
             heading_rad=float(np.angle(turn)),

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from calibration.sky.survey.surveyed_sky import SurveyedSky
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
@@ -87,7 +87,7 @@ def verify(sky: SurveyedSky, held: Sequence[Spots]) -> Verification:
     sigma_m = np.sqrt((sky.sigma_m**2).mean(axis=1))
     tracker = StarTracker(StarCatalogue(sky.ids, x_m.copy(), y_m.copy(), sigma_m), sky.camera)
     answers = [(tracker.solve(spots), spots) for spots in held]
-    solved = [(answer, spots) for answer, spots in answers if isinstance(answer, StarFix)]
+    solved = [(answer, spots) for answer, spots in answers if isinstance(answer, PictureFix)]
     fixes = [fix for fix, _ in solved]
     if not fixes:
         return Verification(len(held), 0, np.zeros((0, 2)), 0, 0, math.nan, "", math.nan)
@@ -117,7 +117,7 @@ def verify(sky: SurveyedSky, held: Sequence[Spots]) -> Verification:
     )
 
 
-def _near_a_star(sky: SurveyedSky, rays: CeilingRays, solved: Sequence[tuple[StarFix, Spots]]) -> int:
+def _near_a_star(sky: SurveyedSky, rays: CeilingRays, solved: Sequence[tuple[PictureFix, Spots]]) -> int:
     """Count the spots that are matched, or whose place by the pose lies near a star."""
     tree = cKDTree(sky.star_m)
     apart = np.asarray(tree.query(sky.star_m, k=2)[0])[:, 1]

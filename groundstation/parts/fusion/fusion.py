@@ -11,8 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
-from groundstation.fusion.estimator import WAITS, Estimator, Fix, ImuPacket, PlanarState
-from groundstation.fusion.estimator import FixAccount as Account
+from groundstation.fusion.estimator import WAITS, Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
@@ -73,7 +72,7 @@ class Fusion(Node):
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
-        self._waiting: dict[tuple[int, str], tuple[int, Account]] = {}
+        self._waiting: dict[tuple[int, str], tuple[int, FixOutcome]] = {}
 
     def start(self, now_ns: int) -> Iterator[Message]:
         if self._calibration:
@@ -154,7 +153,7 @@ class Fusion(Node):
         )
         yield from self._hear_account(account, now_ns)
 
-    def _hear_account(self, account: Account, now_ns: int) -> Iterator[FixAccount]:
+    def _hear_account(self, account: FixOutcome, now_ns: int) -> Iterator[FixAccount]:
         """Pass on what became of a fix, once: when packets up to its exposure, or a second fix, are here."""
         if account.reason in (WAITS, CANDIDATE):
             self._waiting[account.t_exposure_ns, account.source] = now_ns, account
@@ -169,7 +168,7 @@ class Fusion(Node):
             elif account.reason == CANDIDATE and now_ns - arrived_ns > LONGEST_ALONE_NS:
                 yield self._account(account, now_ns)
 
-    def _account(self, account: Account, now_ns: int) -> FixAccount:
+    def _account(self, account: FixOutcome, now_ns: int) -> FixAccount:
         self._waiting.pop((account.t_exposure_ns, account.source), None)
         self._used += account.used
         self._refused += not account.used

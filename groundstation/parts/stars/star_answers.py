@@ -13,7 +13,9 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.picture_notes import PictureNotes
 
 
-def fix_message(spots: StarSpots, answer: fixes.StarFix, exposure_ns: int, stamp_sigma_s: float) -> StarFix:
+def fix_message(
+    spots: StarSpots, answer: fixes.PictureFix, exposure_ns: int, stamp_sigma_s: float
+) -> StarFix:
     """The pose found in a set of spots, stamped with the middle of their exposure."""
     return StarFix(
         exposure_ns,

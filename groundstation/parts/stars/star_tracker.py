@@ -18,8 +18,7 @@ from groundstation.parts.stars.picture_choice import PictureChoice
 from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior
-from groundstation.star_tracking.fixes import StarFix as Fix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior
 from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.prior_governor import PriorGovernor
 from groundstation.star_tracking.sky_watch import SkyWatch
@@ -123,7 +122,7 @@ class StarTracker(Node):
         self,
         spots: StarSpots,
         lights: Spots,
-        answer: Fix | NoFix,
+        answer: PictureFix | NoFix,
         kind: str,
         reason: str,
         belief: PosePrior | None,

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from bench.fusion.planar import GYRO, HEADING, POSITION, SIZE, Array, Reading, moved, pose_of
-from groundstation.fusion.estimator import Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Counters, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 
 NS = 1e-9
@@ -85,14 +85,14 @@ class LatePeer(ABC):
         self._newest = reading
         return reading
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Go to the exposure, correct, run open loop to now."""
         until_s = fix.t_exposure_ns * NS
         if self._now is None:
             is_proved = self._is_near(self._first, fix)
             self._first = fix
             if not is_proved:
-                return FixAccount(fix.t_exposure_ns, False, "waits for a second", _NAN, _NAN, _NAN, _NAN)
+                return FixOutcome(fix.t_exposure_ns, False, "waits for a second", _NAN, _NAN, _NAN, _NAN)
             resting = []
             while self._after and self._after[0].end_s <= until_s:
                 resting.append(self._after.popleft())
@@ -101,14 +101,14 @@ class LatePeer(ABC):
             self._x[HEADING] = fix.heading_rad
             self._x[POSITION] = np.array([fix.x_m, fix.y_m]) - pose_of(self._x, self.noise)[:2]
             self._start()
-            account = FixAccount(fix.t_exposure_ns, True, "starts the estimate", _NAN, _NAN, _NAN, _NAN)
+            account = FixOutcome(fix.t_exposure_ns, True, "starts the estimate", _NAN, _NAN, _NAN, _NAN)
         else:
             self._go_to(until_s)
             innovation = np.array([fix.x_m, fix.y_m, fix.heading_rad]) - pose_of(self._x, self.noise)
             innovation[2] = math.remainder(innovation[2], math.tau)
             used, nis = self._correct(fix, innovation)
             reason = "used" if used else "outside the gate"
-            account = FixAccount(fix.t_exposure_ns, used, reason, *innovation.tolist(), nis)
+            account = FixOutcome(fix.t_exposure_ns, used, reason, *innovation.tolist(), nis)
         now = self._x
         for reading in self._after:
             if not self.is_at_rest(reading):
@@ -135,7 +135,7 @@ class LatePeer(ABC):
                 self._advance(first._replace(end_s=until_s, dt_s=before_s))
             self._after.appendleft(first._replace(dt_s=first.dt_s - before_s))
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Nothing waits here."""
         return []
 

@@ -166,6 +166,7 @@ def test_commands_for_others_and_malformed_ones_are_refused(flying):
     for counter, pulse_id, times in bad:
         assert guard.update(0, ValveCommand(1, counter, pulse_id, times)) is Verdict.MALFORMED
     assert guard.counters.malformed == len(bad)
+    assert guard.counters.commands == len(bad) + 1
     assert guard.counters.other_vehicle == 1
 
 

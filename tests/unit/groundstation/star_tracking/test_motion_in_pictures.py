@@ -7,12 +7,12 @@ import pytest
 from oracles.motion import Smear, smear_from_streaks, unbend
 
 from groundstation.star_tracking.detection import detect
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, Refusal, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, Refusal
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 
 def error_mm(fix, pose):
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     return 1e3 * np.hypot(fix.x_m - pose[0], fix.y_m - pose[1])
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.prior_governor import GovernorSettings, PriorGovernor
 
 NONE = np.zeros(0, np.int64)
 
 
 def fix(mode, x=1.0):
-    return StarFix(x, 2.0, 0.5, np.eye(3) * 1e-8, 9, mode, NONE, NONE, np.zeros((0, 2)), 50.0)
+    return PictureFix(x, 2.0, 0.5, np.eye(3) * 1e-8, 9, mode, NONE, NONE, np.zeros((0, 2)), 50.0)
 
 
 def prior(sigma=0.005, x=1.0):

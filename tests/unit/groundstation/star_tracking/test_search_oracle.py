@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles.search import oracle_tracker
 
 from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PictureFix, PosePrior
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
@@ -93,7 +93,7 @@ def test_from_a_prior_right_or_wrong(painter, twins, seed, stars, off):
 def test_a_prior_that_is_none_ends_in_lost_in_space(painter, twins, variance):
     spots, pose = mixed_sky(painter, np.random.default_rng(11), 20, 0, 0.03)
     fix = twins[0].solve(spots, PosePrior(*pose, covariance=variance * np.eye(3)))
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     assert fix.mode is Mode.LOST_IN_SPACE
 
 
@@ -106,7 +106,7 @@ def test_with_a_known_motion(painter, catalogue, camera, exposure_s, readout_s):
     velocity = (0.3, -0.2, 0.5)
     spots = detect(painter.paint(rng, (2.4, 1.8, 0.7), velocity, exposure_s, readout_s))
     one, two = (twin.solve(spots, motion=BodyMotion(*velocity)) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -119,7 +119,7 @@ def test_painted_pictures_sharp_and_blurred(painter, twins, velocity, lights):
     strangers = [(*rng.uniform((10.0, 10.0), (630.0, 470.0)), 30e3) for _ in range(lights)]
     spots = detect(painter.paint(rng, (2.7, 2.2, -1.1), velocity, 0.033, lights=strangers))
     one, two = (twin.solve(spots) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -142,7 +142,7 @@ def test_spots_in_one_place_and_far_outside_do_no_harm(painter, twins):
     uv = np.column_stack((spots.u_px, spots.v_px))
     odd = [uv[0], uv[0], uv[1], [-1e9, 1e9], [3e5, -5.0]]
     one, two = (twin.solve(spots_at(np.concatenate((uv, odd)), np.random.default_rng(1))) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -150,7 +150,7 @@ def test_nan_among_the_spots_gives_a_fix_without_them_or_none(painter, twins):
     spots, _ = mixed_sky(painter, np.random.default_rng(16), 12, 0, 0.03)
     spots.u_px[3] = np.nan
     fix = twins[0].solve(spots)
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     assert 3 not in fix.spot_index
     spots.u_px[:] = np.nan
     assert isinstance(twins[0].solve(spots), NoFix)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.sky_change import Change
 from groundstation.star_tracking.sky_watch import SkyWatch
 from groundstation.star_tracking.tracker import StarTracker
@@ -38,7 +38,7 @@ class Flight:
         for _ in range(count):
             spots = self.picture(stars, lit)
             fix = self.tracker.solve(spots)
-            assert isinstance(fix, StarFix)
+            assert isinstance(fix, PictureFix)
             found = self.watch.note(fix, spots)
             if found:
                 self.tracker.drop(self.watch.dropped)

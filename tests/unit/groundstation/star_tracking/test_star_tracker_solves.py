@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from groundstation.star_tracking.detection import PictureError, Spots, detect
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.tracker import StarTracker
 
 
@@ -44,7 +44,7 @@ def test_a_painted_sky_is_solved_to_a_tenth_of_a_millimetre(painter, tracker):
     for _ in range(4):
         pose = random_pose(rng)
         fix = tracker.solve(detect(painter.paint(rng, pose)))
-        assert isinstance(fix, StarFix)
+        assert isinstance(fix, PictureFix)
         assert fix.mode is Mode.LOST_IN_SPACE
         error = pose_error(fix, pose)
         assert np.hypot(*error[:2]) < 1e-4
@@ -69,7 +69,7 @@ def test_a_few_stars_scattered_over_the_picture_are_enough(painter, tracker, lef
         seen = rng.permutation(painter.visible(pose))[:left]
         uv = painter.project(*pose)[seen] + rng.normal(0.0, 0.03, (left, 2))
         fix = tracker.solve(spots_at(uv))
-        assert isinstance(fix, StarFix)
+        assert isinstance(fix, PictureFix)
         assert np.hypot(*pose_error(fix, pose)[:2]) < 2e-3
 
 
@@ -83,7 +83,7 @@ def test_three_stars_are_believed_only_with_a_prior(painter, tracker):
     assert alone.reason is Refusal.TOO_FEW_STARS
     prior = PosePrior(pose[0] + 0.01, pose[1] - 0.008, pose[2] + 0.005, np.diag([1e-4, 1e-4, 1e-4]))
     fix = tracker.solve(spots, prior)
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     assert fix.mode is Mode.TRACKING
     assert np.hypot(*pose_error(fix, pose)[:2]) < 1e-3
 
