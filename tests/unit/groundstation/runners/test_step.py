@@ -94,7 +94,6 @@ class Bench:
                 f"{node.vehicle}/taker_{place}",
                 node,
                 PROCESS,
-                5,
                 self.journal,
                 sequences,
                 False,
