@@ -17,7 +17,7 @@ class Quantity:
     """One calibrated number."""
 
     value: float
-    std: float
+    sigma: float
     """One standard deviation, same unit; NaN where it is not known."""
     unit: str
 
@@ -51,8 +51,8 @@ class CalibrationResult:
         lines = [f"# {self.title}", "", *toml_lines({**origin, **self.notes})]
         for table, quantities in (("", self.quantities), ("residual.", self.residual)):
             for name, quantity in quantities.items():
-                std = {} if math.isnan(quantity.std) else {"std": quantity.std}
-                lines += toml_table(table + name, {"value": quantity.value, **std, "unit": quantity.unit})
+                sigma = {} if math.isnan(quantity.sigma) else {"std": quantity.sigma}
+                lines += toml_table(table + name, {"value": quantity.value, **sigma, "unit": quantity.unit})
         return "\n".join(lines) + "\n"
 
 
@@ -60,7 +60,7 @@ def quantity_lines(quantities: Mapping[str, Quantity]) -> list[str]:
     """Return quantities in words, a line each."""
     lines = []
     for name, quantity in quantities.items():
-        spread = "" if math.isnan(quantity.std) else f" ± {quantity.std:.2g}"
+        spread = "" if math.isnan(quantity.sigma) else f" ± {quantity.sigma:.2g}"
         lines.append(f"{name} = {quantity.value:.6g}{spread} {quantity.unit}")
     return lines
 

@@ -19,7 +19,7 @@ def states(recording: Recording, vehicle: str) -> np.ndarray:
     found = (message.payload for message in recording.messages([VehicleState], [vehicle]))
     rows = np.array(
         [
-            (state.stamp_ns * 1e-9, *state.position_table_m, state.heading_rad, *state.pose_std)
+            (state.stamp_ns * 1e-9, *state.position_table_m, state.heading_rad, *state.pose_sigma)
             for state in found
             if isinstance(state, VehicleState)
         ]

@@ -36,10 +36,10 @@ def main() -> None:
                     x, y = frame.tilt_difference_counts
                     rate = rate_rad_s(frame.gyro_counts)
                     samples.append((rate, specific_force_m_s2(x), specific_force_m_s2(y)))
-    mean, std = np.mean(samples, axis=0), np.std(samples, axis=0)
+    mean, sigma = np.mean(samples, axis=0), np.std(samples, axis=0)
     print(f"version {frames.detected_version}, {len(samples)} samples")
-    print(f"rate {np.degrees(mean[0]):+.3f} +- {np.degrees(std[0]):.3f} deg/s")
-    print(f"force x {mean[1]:+.4f} +- {std[1]:.4f}, y {mean[2]:+.4f} +- {std[2]:.4f} m/s2")
+    print(f"rate {np.degrees(mean[0]):+.3f} +- {np.degrees(sigma[0]):.3f} deg/s")
+    print(f"force x {mean[1]:+.4f} +- {sigma[1]:.4f}, y {mean[2]:+.4f} +- {sigma[2]:.4f} m/s2")
     print(", ".join(f"{name} {count}" for name, count in frames.counters.as_dict().items() if count))
 
 

@@ -60,8 +60,8 @@ def main() -> None:
         return
     print(
         f"x {answer.x_m:.5f} m, y {answer.y_m:.5f} m, heading {math.degrees(answer.heading_rad):.4f} deg, by "
-        f"{answer.stars} stars; sigma {answer.std_x_m * 1e3:.3f} mm, {answer.std_y_m * 1e3:.3f} mm, "
-        f"{math.degrees(answer.std_heading_rad):.4f} deg"
+        f"{answer.stars} stars; sigma {answer.sigma_x_m * 1e3:.3f} mm, {answer.sigma_y_m * 1e3:.3f} mm, "
+        f"{math.degrees(answer.sigma_heading_rad):.4f} deg"
     )
     if arguments.picture is None:
         print(f"off the truth by {math.dist((answer.x_m, answer.y_m), (x, y)) * 1e3:.3f} mm")

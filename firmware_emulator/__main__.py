@@ -14,6 +14,6 @@ if __name__ == "__main__":
         signal.signal(number, lambda *_: os._exit(0))
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported
 
-    from firmware_emulator.live.command import main
+    from firmware_emulator.live.command_line import main
 
     sys.exit(main())

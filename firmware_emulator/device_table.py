@@ -16,7 +16,7 @@ from drivers.errors import NotFound
 from drivers.valve_bus.protocol import MAX_VEHICLES
 from firmware_emulator.config import LaboratoryConfig
 from firmware_emulator.device_kind import DeviceKind
-from firmware_emulator.devices.failure_desk import LABORATORY
+from firmware_emulator.devices.failure_channel import LABORATORY
 from firmware_emulator.devices.imu import IMU
 from firmware_emulator.devices.overhead_camera import OVERHEAD_CAMERA
 from firmware_emulator.devices.pose_streams import FIXES, REFERENCE

@@ -30,7 +30,7 @@ from groundstation.parts.valves.messages import ValveCommand
 from groundstation.rig.read import load_rig
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
@@ -64,7 +64,7 @@ class Flight:
                     (t_s, *said.position_table_m, said.heading_rad)
                 )
             case VehicleState(status="flying"):
-                row = (t_s, *said.position_table_m, said.heading_rad, *said.pose_std)
+                row = (t_s, *said.position_table_m, said.heading_rad, *said.pose_sigma)
                 self.state.setdefault(said.vehicle, []).append(row)
             case StarImage():
                 self.images[said.vehicle] = said
@@ -144,7 +144,7 @@ def draw_mock_up(axes: Axes, pose: Array, colour: str, open_mask: int) -> None:
 
 
 def draw_frame(
-    axes: Axes, image: NDArray[np.uint8], spots: Spots, fix: StarFix, names: tuple[str, ...]
+    axes: Axes, image: NDArray[np.uint8], spots: Spots, fix: PictureFix, names: tuple[str, ...]
 ) -> None:
     """The camera's frame with the stars that the tracker named."""
     bright = np.clip((image.astype(float) - spots.background_dn + 6.0) / 110.0, 0.0, 1.0) ** 0.6
@@ -157,7 +157,8 @@ def draw_frame(
     axes.set_ylim(image.shape[0] - 0.5, -0.5)
     axes.set_xticks([])
     axes.set_yticks([])
-    off = f"{fix.stars} stars, sigma {1e3 * fix.std_x_m:.3f} mm, {math.degrees(fix.std_heading_rad):.4f} deg"
+    off_deg = math.degrees(fix.sigma_heading_rad)
+    off = f"{fix.stars} stars, sigma {1e3 * fix.sigma_x_m:.3f} mm, {off_deg:.4f} deg"
     axes.set_title(f"Alpha's star camera: {off}", color=INK, fontsize=9)
 
 
@@ -182,7 +183,7 @@ def compose(flight: Flight, path: Path) -> None:
     image = np.frombuffer(said.data, np.uint8).reshape(said.height, said.width)
     spots = detect(image)
     fix = tracker.solve(spots)
-    assert isinstance(fix, StarFix), fix
+    assert isinstance(fix, PictureFix), fix
     figure = Figure(figsize=(13, 6.4), layout="constrained", facecolor=NIGHT)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[3.2, 1])
     panels = [figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])]

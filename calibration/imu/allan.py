@@ -28,7 +28,7 @@ class AllanDeviation:
 
     tau_s: Array
     deviation: Array
-    std: Array
+    sigma: Array
     """Of the deviation itself, for white noise."""
     random_walk: float
     """White noise density: the deviation at 1 s on the slope of -1/2; channel unit times sqrt(s)."""
@@ -69,21 +69,21 @@ def allan_deviation(rate: Array, period_s: float, points_per_decade: int = 10) -
     factors = np.unique(np.round(np.geomspace(1, longest, steps)).astype(int))
     deviation = overlapping_deviation(rate, period_s, factors)
     tau = factors * period_s
-    std = deviation / np.sqrt(2.0 * np.maximum(n / factors - 1.0, 1.0))
+    sigma = deviation / np.sqrt(2.0 * np.maximum(n / factors - 1.0, 1.0))
     lowest = int(np.argmin(deviation))
-    white = _white_density(tau, deviation, std, lowest)
+    white = _white_density(tau, deviation, sigma, lowest)
     turned = bool((deviation[lowest + 1 :] > 1.15 * deviation[lowest]).any())
     floor = float(deviation[lowest]) / FLICKER_FLOOR
-    return AllanDeviation(tau, deviation, std, white, floor, float(tau[lowest]), turned)
+    return AllanDeviation(tau, deviation, sigma, white, floor, float(tau[lowest]), turned)
 
 
-def _white_density(tau: Array, deviation: Array, std: Array, lowest: int) -> float:
+def _white_density(tau: Array, deviation: Array, sigma: Array, lowest: int) -> float:
     """Fit the slope of -1/2 left of the minimum, where the logarithmic slope is near it."""
     slope = np.gradient(np.log(deviation), np.log(tau))
     rows = (np.arange(len(tau)) <= lowest) & (np.abs(slope + 0.5) < 0.2)
     if not rows.any():
         return math.nan
-    weight = (deviation[rows] / std[rows]) ** 2
+    weight = (deviation[rows] / sigma[rows]) ** 2
     logs = np.log(deviation[rows] * np.sqrt(tau[rows]))
     return math.exp(float(np.sum(weight * logs) / np.sum(weight)))
 

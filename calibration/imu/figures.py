@@ -30,10 +30,12 @@ def draw_rest(rest: Array, found: ZeroOffset) -> Figure:
     """Draw the rest's packets (n, 5), its mean, and what was cut out."""
     figure = new_figure(9.0, 7.0)
     for k, (axes, label) in enumerate(
-        zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
+        zip(_axes(figure, 3), ("rate, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
     ):
         axes.plot(rest[:, 0], rest[:, k + 1], ".", markersize=2, color="0.5", label="packets")
-        axes.axhline(found.mean[k], color="tab:blue", label=f"mean {found.mean[k]:.6f} ± {found.std[k]:.1g}")
+        axes.axhline(
+            found.mean[k], color="tab:blue", label=f"mean {found.mean[k]:.6f} ± {found.mean_sigma[k]:.1g}"
+        )
         reach = 6.0 * found.packet_sigma[k]
         axes.set_ylim(found.mean[k] - reach, found.mean[k] + reach)
         axes.set_ylabel(label)
@@ -50,13 +52,13 @@ def draw_temperature(found: TemperatureSlope) -> Figure:
     figure = new_figure(8.0, 7.0)
     heat = found.block_temperature_c
     for k, (axes, label) in enumerate(
-        zip(_axes(figure, 3), ("omega, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
+        zip(_axes(figure, 3), ("rate, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
     ):
         axes.plot(heat, found.block_mean[:, k], ".", color="0.4")
         axes.plot(heat, found.at_reference[k] + found.slope[k] * (heat - found.reference_c), color="tab:blue")
         axes.set_ylabel(label)
         axes.set_title(
-            f"{found.slope[k]:.3g} ± {found.slope_std[k]:.1g} {label.split()[1]} per °C", fontsize=9
+            f"{found.slope[k]:.3g} ± {found.slope_sigma[k]:.1g} {label.split()[1]} per °C", fontsize=9
         )
     axes.set_xlabel("temperature, °C")
     return figure
@@ -82,7 +84,7 @@ def draw_allan(curves: dict[str, AllanDeviation], units: dict[str, str]) -> Figu
     """Draw the Allan deviations with their white-noise slopes."""
     figure = new_figure(8.0, 8.0)
     for axes, (name, curve) in zip(_axes(figure, len(curves)), curves.items(), strict=True):
-        axes.errorbar(curve.tau_s, curve.deviation, curve.std, fmt=".-", markersize=3, linewidth=0.8)
+        axes.errorbar(curve.tau_s, curve.deviation, curve.sigma, fmt=".-", markersize=3, linewidth=0.8)
         axes.plot(
             curve.tau_s, curve.random_walk / np.sqrt(curve.tau_s), "--", color="0.5", label="white noise"
         )
@@ -119,7 +121,7 @@ def draw_tilt(found: TiltAxes) -> Figure:
         axes.errorbar(
             number,
             1e3 * found.residual_m_s2[:, k],
-            1e3 * found.residual_std_m_s2[:, k],
+            1e3 * found.residual_sigma_m_s2[:, k],
             fmt="o",
             markersize=4,
         )

@@ -22,9 +22,9 @@ class GyroScale:
     """True rate = (reading - null) (1 - scale)."""
 
     scale: float
-    scale_std: float
+    scale_sigma: float
     null_rad_s: float
-    null_std_rad_s: float
+    null_sigma_rad_s: float
     turned_rad: float
     """Between the most distant headings of the gyro's path."""
     residual_rms_rad: float
@@ -37,14 +37,14 @@ class GyroScale:
 
 
 def gyro_scale(
-    end_s: Array, span_s: Array, omega_rad_s: Array, fix_s: Array, heading_rad: Array, null_rad_s: float
+    end_s: Array, span_s: Array, rate_rad_s: Array, fix_s: Array, heading_rad: Array, null_rad_s: float
 ) -> GyroScale:
     """Fit heading_k = heading_0 + (1 - scale)(Theta_k - null t_k) to the stars, wrong fixes trimmed.
 
     Args:
         end_s: (n,) ends of the packets, ascending.
         span_s: (n,) the time each stands for.
-        omega_rad_s: (n,) readings.
+        rate_rad_s: (n,) readings.
         fix_s: (m,) exposures.
         heading_rad: (m,) star headings, wrapped or not.
         null_rad_s: rough null, to unwrap with.
@@ -56,7 +56,7 @@ def gyro_scale(
     t, stars = fix_s[inside], heading_rad[inside]
     if len(t) < 8:
         raise CalibrationRefusedError(f"at least 8 fixes are needed, found {len(t)}")
-    path = np.interp(t, end_s, np.cumsum((omega_rad_s - null_rad_s) * span_s))
+    path = np.interp(t, end_s, np.cumsum((rate_rad_s - null_rad_s) * span_s))
     elapsed = t - t[0]
     turned = float(np.ptp(path))
     if turned < LEAST_TURN_RAD:
@@ -74,10 +74,10 @@ def gyro_scale(
         used = keep
     freedom = max(1, int(used.sum()) - 3)
     variance = float((left[used] ** 2).sum()) / freedom
-    cov = np.linalg.inv(A[used].T @ A[used]) * variance
-    null_std = math.sqrt(cov[2, 2])
+    covariance = np.linalg.inv(A[used].T @ A[used]) * variance
+    null_sigma = math.sqrt(covariance[2, 2])
     return GyroScale(
-        float(found[1]), math.sqrt(cov[1, 1]), null_rad_s + float(found[2]), null_std, turned,
+        float(found[1]), math.sqrt(covariance[1, 1]), null_rad_s + float(found[2]), null_sigma, turned,
         float(np.sqrt(np.mean(left[used] ** 2))), int(used.sum()), int((~used).sum()), t, left, used,
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from calibration.imu.figures import draw_residuals
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
 from groundstation.fusion.constants import CONSTANTS
-from groundstation.fusion.estimator import FixAccount
+from groundstation.fusion.estimator import FixOutcome
 from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
@@ -77,7 +77,7 @@ def constants(smoother: OfflineSmoother) -> dict[str, Quantity]:
     }
 
 
-def _residuals(data: FlightData, smoother: OfflineSmoother, used: list[FixAccount]) -> np.ndarray:
+def _residuals(data: FlightData, smoother: OfflineSmoother, used: list[FixOutcome]) -> np.ndarray:
     """Return (m, 4) exposure s, and fix less smoothed x, y, heading."""
     states = [state for state in smoother.states() if state is not None]
     t = np.array([state.t_ns for state in states]) * 1e-9

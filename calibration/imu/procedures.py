@@ -32,7 +32,7 @@ def offsets_at_rest(data: FlightData) -> Outcome:
     found = _rest(data)
     cut = [words_of(each) for each in found.disturbances]
     quantities = {
-        f"{name}_offset": Quantity(float(found.mean[k]), float(found.std[k]), unit)
+        f"{name}_offset": Quantity(float(found.mean[k]), float(found.mean_sigma[k]), unit)
         for k, (name, unit) in enumerate(UNITS.items())
     }
     return Outcome(
@@ -66,12 +66,12 @@ def offsets_of_stretch(data: FlightData, start_s: float, end_s: float) -> Outcom
         fit, refused = fit_stretch(data.imu, data.stars, start_s, end_s, _null(data), lever, sigma)
     except ValueError as error:
         raise CalibrationRefusedError(f"from {start_s:g} to {end_s:g} s: {error}") from error
-    std = np.sqrt(np.diag(fit.cov))
+    found_sigma = np.sqrt(np.diag(fit.covariance))
     return _outcome(
         "Zero offsets (mu, nu) by least squares over a stretch of flight",
         {
-            "mu": Quantity(fit.mu_m_s2, float(std[0]), "m/s^2"),
-            "nu": Quantity(fit.nu_m_s2, float(std[1]), "m/s^2"),
+            "mu": Quantity(fit.mu_m_s2, float(found_sigma[0]), "m/s^2"),
+            "nu": Quantity(fit.nu_m_s2, float(found_sigma[1]), "m/s^2"),
         },
         {"position": Quantity(fit.residual_rms_m, math.nan, "m")},
         {"start_s": start_s, "end_s": end_s, "fixes": fit.fixes, "fixes_refused": refused},
@@ -89,7 +89,7 @@ def temperature_slopes(data: FlightData) -> Outcome:
     found = temperature_slope(rest[:, 0], rest[:, 1:4], rest[:, 4])
     units = list(enumerate(UNITS.items()))
     slopes = {
-        f"{name}_slope": Quantity(float(found.slope[k]), float(found.slope_std[k]), f"{unit}/C")
+        f"{name}_slope": Quantity(float(found.slope[k]), float(found.slope_sigma[k]), f"{unit}/C")
         for k, (name, unit) in units
     }
     values = {
@@ -113,14 +113,14 @@ def gyro_scale_by_turns(data: FlightData) -> Outcome:
     """
     imu, stars = data.imu, data.stars[np.argsort(data.stars[:, 0], kind="stable")]
     good = np.isfinite(imu[:, 1]) & (np.abs(imu[:, 1]) < WILD_RATE_RAD_S)
-    t, omega = imu[good, 0], imu[good, 1]
+    t, rate = imu[good, 0], imu[good, 1]
     span = np.diff(t, prepend=t[0] - data.noise.packet_period_s)
-    found = gyro_scale(t, span, _without_spikes(omega), stars[:, 0], stars[:, 4], _null(data))
+    found = gyro_scale(t, span, _without_spikes(rate), stars[:, 0], stars[:, 4], _null(data))
     return _outcome(
         "Gyro scale and null by turns against the stars",
         {
-            "scale": Quantity(found.scale, found.scale_std, "1"),
-            "null": Quantity(found.null_rad_s, found.null_std_rad_s, "rad/s"),
+            "scale": Quantity(found.scale, found.scale_sigma, "1"),
+            "null": Quantity(found.null_rad_s, found.null_sigma_rad_s, "rad/s"),
         },
         {"heading": Quantity(found.residual_rms_rad, math.nan, "rad")},
         {"turned_deg": math.degrees(found.turned_rad), "fixes": found.used, "fixes_refused": found.refused},
@@ -142,7 +142,7 @@ def noise_at_rest(data: FlightData) -> Outcome:
     curves = {name: allan_deviation(even[:, k], period) for k, name in enumerate(UNITS)}
     quantities = {}
     for name, curve in curves.items():
-        relative = float(curve.std[0] / curve.deviation[0])
+        relative = float(curve.sigma[0] / curve.deviation[0])
         quantities[f"{name}_random_walk"] = Quantity(
             curve.random_walk, curve.random_walk * relative, f"{UNITS[name]} sqrt(s)"
         )

@@ -19,11 +19,11 @@ LEAST_SPAN_C = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TemperatureSlope:
-    """Offset = at_reference + slope (T - reference), for omega rad/s, ax and ay m/s^2."""
+    """Offset = at_reference + slope (T - reference), for rate rad/s, ax and ay m/s^2."""
 
     slope: Array
     """(3,) per degree."""
-    slope_std: Array
+    slope_sigma: Array
     at_reference: Array
     reference_c: float
     span_c: float
@@ -43,7 +43,7 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
 
     Args:
         t_s: (n,) stamps of a rest, ascending.
-        readings: (n, 3) omega rad/s, ax, ay m/s^2.
+        readings: (n, 3) rate rad/s, ax, ay m/s^2.
         temperature_c: (n,).
 
     Raises:
@@ -75,12 +75,12 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
         )
     reference = float(heat.mean())
     A = np.column_stack([np.ones_like(heat), heat - reference])
-    found, std, left = np.zeros((2, 3)), np.zeros(3), np.zeros_like(means)
+    found, sigma, left = np.zeros((2, 3)), np.zeros(3), np.zeros_like(means)
     for c in range(3):
-        found[:, c], std[c] = _weighted(A, means[:, c])
+        found[:, c], sigma[c] = _weighted(A, means[:, c])
         left[:, c] = means[:, c] - A @ found[:, c]
     rms = np.sqrt((left**2).mean(axis=0))
-    return TemperatureSlope(found[1], std, found[0], reference, span, rms, when, heat, means)
+    return TemperatureSlope(found[1], sigma, found[0], reference, span, rms, when, heat, means)
 
 
 def _weighted(A: Array, y: Array) -> tuple[Array, float]:
@@ -95,8 +95,8 @@ def _weighted(A: Array, y: Array) -> tuple[Array, float]:
     walk = max(0.0, (far - near) / (lag - 1))
     white = max(0.5 * (near - walk), 1e-3 * near, 1e-30)
     step = np.arange(m)
-    cov = white * np.eye(m) + walk * np.minimum.outer(step, step)
-    root = np.linalg.cholesky(cov)
+    covariance = white * np.eye(m) + walk * np.minimum.outer(step, step)
+    root = np.linalg.cholesky(covariance)
     B, z = np.linalg.solve(root, A), np.linalg.solve(root, y)
     normal = B.T @ B
     return np.linalg.solve(normal, B.T @ z), math.sqrt(float(np.linalg.inv(normal)[1, 1]))

@@ -12,13 +12,13 @@ import numpy as np
 
 from calibration.imu.figures import draw_tilt
 from calibration.imu.procedures import words_of
-from calibration.imu.rests import find_rests
+from calibration.imu.rest_search import find_rests
 from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import NotARest, zero_offset
 from calibration.outcome import Outcome
 from calibration.result import Quantity
 from groundstation.declarations.errors import UsageError
-from groundstation.files.tables import load_table
+from groundstation.files.number_tables import load_table
 from groundstation.fusion.flight_data import Array, FlightData
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import RELEVELLING_SIGMA_M_S2
@@ -85,15 +85,15 @@ def rests_of(name: str, data: FlightData, least_s: float, known: TableMap | None
         except NotARest:
             continue  # too disturbed to be one
         stars = data.stars[(data.stars[:, 0] > start_s) & (data.stars[:, 0] <= stop_s)]
-        heading, heading_std = _heading(stars[:, 4], data.noise.star_sigma_heading_rad)
+        heading, heading_sigma = _heading(stars[:, 4], data.noise.star_sigma_heading_rad)
         slope = (0.0, 0.0)
         if known is not None and len(stars):
             slope = known.acceleration_m_s2(float(np.median(stars[:, 2])), float(np.median(stars[:, 3])))
         rest = Rest(
             (float(offset.mean[1]), float(offset.mean[2])),
-            (float(offset.std[1]), float(offset.std[2])),
+            (float(offset.mean_sigma[1]), float(offset.mean_sigma[2])),
             heading_rad=heading,
-            heading_std_rad=heading_std,
+            heading_sigma_rad=heading_sigma,
             slope_m_s2=slope,
         )
         cut = tuple(f"{name}: {words_of(each)}" for each in offset.disturbances)
@@ -117,10 +117,10 @@ def axes_of(found: RestsFound, tilts: Tilts | None, tilt_sigma_rad: float, known
     rests: Sequence[Rest] = found.rests
     if tilts is not None:
         rests = _with_tilts(tilts, rests, tilt_sigma_rad)
-    slope_std = None
+    slope_sigma = None
     if known is not None:
-        slope_std = math.hypot(RELEVELLING_SIGMA_M_S2, float(np.median(known.std_x_m_s2)))
-    fit = tilt_axes(list(rests), slope_std)
+        slope_sigma = math.hypot(RELEVELLING_SIGMA_M_S2, float(np.median(known.sigma_x_m_s2)))
+    fit = tilt_axes(list(rests), slope_sigma)
     return _outcome(fit, len(rests), found.cut)
 
 
@@ -148,16 +148,18 @@ def _with_tilts(tilts: Tilts, rests: Sequence[Rest], sigma_rad: float) -> list[R
             "one row per rest, in their order."
         )
     return [
-        replace(rest, tilt_rad=(float(along[0]), float(along[1])), tilt_std_rad=sigma_rad)
+        replace(rest, tilt_rad=(float(along[0]), float(along[1])), tilt_sigma_rad=sigma_rad)
         for rest, along in zip(rests, tilts.along_rad, strict=True)
     ]
 
 
 def _outcome(found: TiltAxes, rests: int, cut: Sequence[str]) -> Outcome:
-    std = np.sqrt(np.diag(found.covariance))
+    sigma = np.sqrt(np.diag(found.covariance))
     values = [*found.offset_m_s2.tolist(), *found.matrix.ravel().tolist()]
     quantities = {
-        name: Quantity(values[k] if found.is_known(k) else math.nan, float(std[k]), "m/s^2" if k < 2 else "1")
+        name: Quantity(
+            values[k] if found.is_known(k) else math.nan, float(sigma[k]), "m/s^2" if k < 2 else "1"
+        )
         for k, name in enumerate(NAMES)
     }
     quantities["acc_scale_difference"] = Quantity(*combination(found, DIFFERENCE), "1")
@@ -168,7 +170,7 @@ def _outcome(found: TiltAxes, rests: int, cut: Sequence[str]) -> Outcome:
     words += [
         f"{name}: these rests do not determine it"
         if math.isnan(quantity.value)
-        else f"{name} = {quantity.value:.6g} ± {quantity.std:.2g} {quantity.unit}"
+        else f"{name} = {quantity.value:.6g} ± {quantity.sigma:.2g} {quantity.unit}"
         for name, quantity in quantities.items()
     ]
     words += [f"unknown: {what}" for what in found.unknown]

@@ -37,13 +37,13 @@ class Rest:
     """One rest: what was read, and what is known of how the block stood."""
 
     reading_m_s2: tuple[float, float]
-    reading_std_m_s2: tuple[float, float]
+    reading_sigma_m_s2: tuple[float, float]
     tilt_rad: tuple[float, float] | None = None
     """Of the body's x and y axis above the horizontal, as given by gauge blocks; None on the bare table."""
-    tilt_std_rad: float = 0.0
+    tilt_sigma_rad: float = 0.0
     heading_rad: float | None = None
     """By the stars."""
-    heading_std_rad: float = 0.0
+    heading_sigma_rad: float = 0.0
     slope_m_s2: tuple[float, float] = (0.0, 0.0)
     """The table's known pull at that place."""
 
@@ -64,7 +64,7 @@ class TiltAxes:
     """What the rests cannot tell, in words."""
     residual_m_s2: Array
     """(n, 2)."""
-    residual_std_m_s2: Array
+    residual_sigma_m_s2: Array
     """(n, 2) expected."""
     chi_square_ratio: float
 
@@ -75,21 +75,21 @@ class TiltAxes:
 
     def is_known(self, index: int) -> bool:
         """Whether a row of the covariance has been measured, rather than assumed."""
-        prior = _prior(known_slope_std_m_s2=0.0)[index]
+        prior = _prior(known_slope_sigma_m_s2=0.0)[index]
         return bool(math.sqrt(self.covariance[index, index]) < UNKNOWN_SHARE * prior)
 
 
-def _prior(known_slope_std_m_s2: float) -> Array:
-    slope = known_slope_std_m_s2 or PRIOR_SLOPE_M_S2
+def _prior(known_slope_sigma_m_s2: float) -> Array:
+    slope = known_slope_sigma_m_s2 or PRIOR_SLOPE_M_S2
     return np.array([PRIOR_OFFSET_M_S2] * 2 + [PRIOR_AXES] * 4 + [slope] * 2)
 
 
-def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> TiltAxes:
+def tilt_axes(rests: Sequence[Rest], slope_sigma_m_s2: float | None = None) -> TiltAxes:
     """Fit offset, axes and slope to rests.
 
     Args:
         rests: at least three; on the bare table each with a heading.
-        slope_std_m_s2: of the slope that the rests say is known; None if nothing is known of it.
+        slope_sigma_m_s2: of the slope that the rests say is known; None if nothing is known of it.
 
     Raises:
         CalibrationRefusedError: too few rests, one without tilt and heading, or nothing but the offset can be
@@ -101,7 +101,7 @@ def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> Til
         raise CalibrationRefusedError(
             "a rest on the bare table needs a heading by the stars, or give the tilts of all rests"
         )
-    sigma0 = _prior(known_slope_std_m_s2=slope_std_m_s2 or 0.0)
+    sigma0 = _prior(known_slope_sigma_m_s2=slope_sigma_m_s2 or 0.0)
     if all(rest.heading_rad is None for rest in rests):
         sigma0[6:] = 1e-9  # one heading, unknown: whatever the base's level adds is part of the offset
     x = np.zeros(8)
@@ -119,13 +119,13 @@ def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> Til
         x = x + step
         if np.abs(step / sigma0).max() < 1e-9:
             break
-    cov = np.linalg.inv(normal)
-    learned = int((np.sqrt(np.diag(cov)) < UNKNOWN_SHARE * sigma0).sum())
+    fit_covariance = np.linalg.inv(normal)
+    learned = int((np.sqrt(np.diag(fit_covariance)) < UNKNOWN_SHARE * sigma0).sum())
     chi = float((w * r) @ (w * r)) / max(1, r.size - learned)
-    data = cov * max(1.0, chi)  # worse than stated is believed, better is not
-    keep = np.sqrt(np.diag(cov)) >= UNKNOWN_SHARE * sigma0
-    data[keep] = cov[keep]
-    data[:, keep] = cov[:, keep]
+    data = fit_covariance * max(1.0, chi)  # worse than stated is believed, better is not
+    keep = np.sqrt(np.diag(fit_covariance)) >= UNKNOWN_SHARE * sigma0
+    data[keep] = fit_covariance[keep]
+    data[:, keep] = fit_covariance[:, keep]
     E = x[2:6].reshape(2, 2)
     inverse = np.linalg.inv(np.eye(2) + E)
     to_matrix = np.eye(8)
@@ -133,23 +133,23 @@ def tilt_axes(rests: Sequence[Rest], slope_std_m_s2: float | None = None) -> Til
     covariance = to_matrix @ data @ to_matrix.T
     result = TiltAxes(x[:2], E, x[6:], covariance, (), r.reshape(-1, 2), 1.0 / w.reshape(-1, 2), chi)
     words = _unknown(result, has_slope=bool(sigma0[6] > 1e-6))
-    if not any(result.is_known(k) for k in range(2, 6)) and _combination_std(result, (1, 0, 0, -1)) > 0.03:
+    if not any(result.is_known(k) for k in range(2, 6)) and _combination_sigma(result, (1, 0, 0, -1)) > 0.03:
         raise CalibrationRefusedError(
             "the rests are too alike to tell scale or axes: tilt further (gauge blocks), or turn through "
             "more headings on a table that is tilted by some mrad"
         )
     return TiltAxes(
         result.offset_m_s2, E, result.slope_m_s2, covariance, words, result.residual_m_s2,
-        result.residual_std_m_s2, chi,
+        result.residual_sigma_m_s2, chi,
     )  # fmt: skip
 
 
 def combination(found: TiltAxes, weights: tuple[float, float, float, float]) -> tuple[float, float]:
     """Return value and sigma of a weighted sum of M's entries, row by row."""
-    return float(np.dot(weights, found.matrix.ravel())), _combination_std(found, weights)
+    return float(np.dot(weights, found.matrix.ravel())), _combination_sigma(found, weights)
 
 
-def _combination_std(found: TiltAxes, weights: tuple[float, ...]) -> float:
+def _combination_sigma(found: TiltAxes, weights: tuple[float, ...]) -> float:
     row = np.zeros(8)
     row[2:6] = weights
     return math.sqrt(float(row @ found.covariance @ row))
@@ -163,11 +163,11 @@ def _force(rest: Rest, x: Array) -> tuple[Array, Array, Array]:
         c, s = math.cos(rest.heading_rad), math.sin(rest.heading_rad)
         turn = np.array([[c, s], [-s, c]])
         force = -turn @ (np.array(rest.slope_m_s2) + x[6:])
-    placed = rest.heading_std_rad * float(np.hypot(*force))
+    placed = rest.heading_sigma_rad * float(np.hypot(*force))
     if rest.tilt_rad is not None:
         force = force + G_M_S2 * np.sin(rest.tilt_rad)
-        placed = math.hypot(placed, G_M_S2 * rest.tilt_std_rad)
-    return force, turn, np.hypot(rest.reading_std_m_s2, placed)
+        placed = math.hypot(placed, G_M_S2 * rest.tilt_sigma_rad)
+    return force, turn, np.hypot(rest.reading_sigma_m_s2, placed)
 
 
 def _jacobian(x: Array, f: Array, turn: Array) -> Array:

@@ -49,11 +49,11 @@ class Disturbance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ZeroOffset:
-    """Offsets of omega rad/s, ax and ay m/s^2 at rest; on a slope the accelerometers' hold its gravity."""
+    """Offsets of rate rad/s, ax and ay m/s^2 at rest; on a slope the accelerometers' hold its gravity."""
 
     mean: Array
     """(3,)."""
-    std: Array
+    mean_sigma: Array
     """(3,) of the mean: white noise, and the wandering seen between blocks."""
     packet_sigma: Array
     """(3,) of one packet."""
@@ -68,7 +68,7 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
 
     Args:
         t_s: (n,) stamps, ascending.
-        readings: (n, 3) omega rad/s, ax, ay m/s^2.
+        readings: (n, 3) rate rad/s, ax, ay m/s^2.
         temperature_c: (n,), NaN where unknown.
 
     Raises:
@@ -109,11 +109,13 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     kept = readings[good]
     steady = means[~is_bad]
     between = steady.std(axis=0, ddof=1) / math.sqrt(len(steady))
-    std = np.maximum(sigma / math.sqrt(len(kept)), between)
+    mean_sigma = np.maximum(sigma / math.sqrt(len(kept)), between)
     known = temperature_c[good][np.isfinite(temperature_c[good])]
     warmth = float(known.mean()) if len(known) else math.nan
     found.sort(key=lambda d: d.start_s)
-    return ZeroOffset(kept.mean(axis=0), std, sigma, warmth, len(kept), float(t_s[-1] - t_s[0]), tuple(found))
+    return ZeroOffset(
+        kept.mean(axis=0), mean_sigma, sigma, warmth, len(kept), float(t_s[-1] - t_s[0]), tuple(found)
+    )
 
 
 def packet_sigma(readings: Array) -> Array:

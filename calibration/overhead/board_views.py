@@ -8,13 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.overhead.pose import BoardView
+from calibration.overhead.camera_pose import BoardView
 from calibration.sky.board import Board, find_corners
 from groundstation.cli.progress import with_progress
 from groundstation.data_sets.star_folder import find_frames, read_frame
 from groundstation.files.errors import FileError
+from groundstation.files.number_tables import load_table
 from groundstation.files.reading import read_bytes
-from groundstation.files.tables import load_table
 from groundstation.overhead.overhead_camera import OverheadCamera
 
 NO_POSE = {"position_table_m": [0.0, 0.0, 1.0], "yaw_rad": 0.0, "tilt_x_rad": 0.0, "tilt_y_rad": 0.0}

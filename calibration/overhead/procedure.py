@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.outcome import Outcome
+from calibration.overhead.camera_pose import POSE, BoardView, OverheadPose, calibrate_overhead_pose
 from calibration.overhead.figures import draw_board_pose
-from calibration.overhead.pose import POSE, BoardView, OverheadPose, calibrate_overhead_pose
 from calibration.result import Quantity
 from groundstation.overhead.overhead_camera import OverheadCamera
 
@@ -43,8 +43,8 @@ def pose_by_board(
         title="Pose of the camera over the table, by a board",
         summary=_sentence(pose, len(views)),
         quantities={
-            name: Quantity(value, float(std), "m" if name.endswith("_m") else "rad")
-            for name, value, std in zip(POSE, values, pose.std, strict=True)
+            name: Quantity(value, float(sigma), "m" if name.endswith("_m") else "rad")
+            for name, value, sigma in zip(POSE, values, pose.sigma, strict=True)
         },
         residual={
             "corner_rms": Quantity(_rms(pose.residual_px), math.nan, "px"),
@@ -60,8 +60,8 @@ def pose_by_board(
 def _sentence(pose: OverheadPose, pictures: int) -> str:
     x, y, z = pose.camera.position_table_m
     return (
-        f"the camera hangs at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {1e3 * max(pose.std[:3]):.1f} mm and "
-        f"{math.degrees(max(pose.std[3:])):.2f} deg; corners {_rms(pose.residual_px):.3f} px, "
+        f"the camera hangs at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {1e3 * max(pose.sigma[:3]):.1f} mm and "
+        f"{math.degrees(max(pose.sigma[3:])):.2f} deg; corners {_rms(pose.residual_px):.3f} px, "
         f"tape against pictures {1e3 * _rms(pose.tape_m):.2f} mm over {pictures} places."
     )
 

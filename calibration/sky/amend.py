@@ -9,8 +9,8 @@ from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.sky.amendment import Amendment, NewPlace, propose
 from calibration.sky.star_list import COLUMNS, star_list_text, star_row
 from groundstation.declarations.errors import UsageError
+from groundstation.files.number_tables import Table, parse_table
 from groundstation.files.reading import read_bytes, text_of
-from groundstation.files.tables import Table, parse_table
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.stars import messages as stars
 from groundstation.parts.stars.star_answers import change_of
@@ -76,23 +76,25 @@ def _applied(table: Table, amendment: Amendment) -> str:
     """Return the list with the amendment applied, in its order, new stars last."""
     moved = {star.name: star for star in amendment.moved}
     rows: list[tuple[str, ...]] = []
-    for name, x_m, y_m, std_x_m, std_y_m, times_seen in zip(*(table.words[c] for c in COLUMNS), strict=True):
+    for name, x_m, y_m, sigma_x_m, sigma_y_m, times_seen in zip(
+        *(table.words[c] for c in COLUMNS), strict=True
+    ):
         if name in moved:
             rows.append(_row(moved[name]))
         elif name not in amendment.struck:
-            rows.append((name, x_m, y_m, std_x_m or "0", std_y_m or "0", times_seen or "0"))
+            rows.append((name, x_m, y_m, sigma_x_m or "0", sigma_y_m or "0", times_seen or "0"))
     return star_list_text([*rows, *(_row(star) for star in amendment.added)])
 
 
 def _row(star: NewPlace) -> tuple[str, ...]:
-    return star_row(star.name, (star.x_m, star.y_m), (star.std_x_m, star.std_y_m), star.times_seen)
+    return star_row(star.name, (star.x_m, star.y_m), (star.sigma_x_m, star.sigma_y_m), star.times_seen)
 
 
 def _words(amendment: Amendment) -> list[str]:
     lines = [f"star {name}: struck off" for name in amendment.struck]
     for what, places in (("moved", amendment.moved), ("added", amendment.added)):
         for star in places:
-            sigma = f"one sigma {1e3 * star.std_x_m:.2f}, {1e3 * star.std_y_m:.2f} mm"
+            sigma = f"one sigma {1e3 * star.sigma_x_m:.2f}, {1e3 * star.sigma_y_m:.2f} mm"
             place = f"({star.x_m:.4f}, {star.y_m:.4f}) m"
             lines.append(f"star {star.name}: {what}, {place}, {sigma}, seen {star.times_seen} times")
     return lines

@@ -29,16 +29,16 @@ class NewPlace:
         name: Its id in the list; new ones are numbered on.
         x_m: Table.
         y_m: Table.
-        std_x_m: One sigma.
-        std_y_m: One sigma.
+        sigma_x_m: One sigma.
+        sigma_y_m: One sigma.
         times_seen: Sightings behind it.
     """
 
     name: str
     x_m: float
     y_m: float
-    std_x_m: float
-    std_y_m: float
+    sigma_x_m: float
+    sigma_y_m: float
     times_seen: int
 
 
@@ -116,12 +116,12 @@ def _average(name: str, found: Sequence[SkyChange]) -> NewPlace:
     """Combine places by their covariances."""
     information, weighted = np.zeros((2, 2)), np.zeros(2)
     for change in found:
-        xx, xy, yy = change.cov_m2
+        xx, xy, yy = change.covariance_m2
         weight = np.linalg.inv([[xx, xy], [xy, yy]])
         information += weight
         weighted += weight @ (change.x_m, change.y_m)
-    cov = np.linalg.inv(information)
-    x, y = cov @ weighted
-    std_x, std_y = np.sqrt(np.diag(cov))
+    covariance = np.linalg.inv(information)
+    x, y = covariance @ weighted
+    sigma_x, sigma_y = np.sqrt(np.diag(covariance))
     sightings = sum(change.sightings for change in found)
-    return NewPlace(name, float(x), float(y), float(std_x), float(std_y), sightings)
+    return NewPlace(name, float(x), float(y), float(sigma_x), float(sigma_y), sightings)

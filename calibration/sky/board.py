@@ -46,7 +46,7 @@ class Intrinsics:
         cx: Principal point, px.
         cy: Principal point, px.
         distortion: k1, k2, p1, p2, k3.
-        std: One sigma of fx, fy, cx, cy, k1, k2, p1, p2, k3.
+        sigma: One sigma of fx, fy, cx, cy, k1, k2, p1, p2, k3.
         residual_px: Corner minus model, shape (m, 2).
         pictures: How many showed the board.
     """
@@ -56,7 +56,7 @@ class Intrinsics:
     cx: float
     cy: float
     distortion: tuple[float, float, float, float, float]
-    std: tuple[float, ...]
+    sigma: tuple[float, ...]
     residual_px: NDArray[np.float64]
     pictures: int
 
@@ -101,7 +101,7 @@ def calibrate_from_board(
     points = [view[0] for view in views]
     pixels = [view[1] for view in views]
     start = np.array([[width, 0.0, 0.5 * (width - 1)], [0.0, width, 0.5 * (height - 1)], [0.0, 0.0, 1.0]])
-    _, matrix, distortion, turns, shifts, std, _, _ = cv2.calibrateCameraExtended(
+    _, matrix, distortion, turns, shifts, sigma, _, _ = cv2.calibrateCameraExtended(
         points,
         pixels,
         (width, height),
@@ -120,7 +120,7 @@ def calibrate_from_board(
         cx=float(matrix[0, 2]),
         cy=float(matrix[1, 2]),
         distortion=(k[0], k[1], k[2], k[3], k[4]),
-        std=tuple(float(value) for value in np.asarray(std).ravel()[:9]),
+        sigma=tuple(float(value) for value in np.asarray(sigma).ravel()[:9]),
         residual_px=np.concatenate(residual).astype(np.float64),
         pictures=len(views),
     )

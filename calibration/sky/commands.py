@@ -149,7 +149,9 @@ def survey(
         Path, typer.Argument(help="With camera.json, anchors.csv and frames/ of a slow sweep.")
     ],
     out: Annotated[Path, typer.Option(help="Catalogue to write (CSV); its provenance beside it (TOML).")],
-    tape_std_mm: Annotated[float, typer.Option(help="How well the anchors were measured.", min=0.01)] = 3.0,
+    tape_sigma_mm: Annotated[
+        float, typer.Option("--tape-std-mm", help="How well the anchors were measured.", min=0.01)
+    ] = 3.0,
     camera_out: Annotated[
         Path | None, typer.Option(help="camera.json to write with the ceiling's height as found.")
     ] = None,
@@ -183,7 +185,7 @@ def survey(
             anchors,
             camera,
             names,
-            tape_std_m=1e-3 * tape_std_mm,
+            tape_sigma_m=1e-3 * tape_sigma_mm,
             is_lens_free=lens,
             verify_every=verify_every,
             progress=progress,

@@ -70,11 +70,11 @@ def delay_from_headings(
     return Outcome(
         title="Camera delay against the IMU",
         summary=(
-            f"delay {1e3 * found.delay_s:.2f} ms, one sigma {1e3 * found.std_s:.2f} ms, "
+            f"delay {1e3 * found.delay_s:.2f} ms, one sigma {1e3 * found.sigma_s:.2f} ms, "
             f"jitter {1e3 * found.jitter_s:.2f} ms."
         ),
         quantities={
-            "delay": Quantity(found.delay_s, found.std_s, "s"),
+            "delay": Quantity(found.delay_s, found.sigma_s, "s"),
             "jitter": Quantity(found.jitter_s, math.nan, "s"),
             "gyro_bias": Quantity(found.gyro_bias_rad_s, math.nan, "rad/s"),
             "gyro_scale": Quantity(found.gyro_scale, math.nan, "1"),

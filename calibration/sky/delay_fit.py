@@ -33,7 +33,7 @@ class CameraDelay:
 
     Attributes:
         delay_s: Arrival minus exposure.
-        std_s: One sigma of it, the same for all pictures.
+        sigma_s: One sigma of it, the same for all pictures.
         jitter_s: One sigma by which single pictures differ from it; 0 where the residuals show none.
         gyro_bias_rad_s: To subtract from the gyro's rate.
         gyro_scale: Turn by the stars over turn by the gyro.
@@ -43,7 +43,7 @@ class CameraDelay:
     """
 
     delay_s: float
-    std_s: float
+    sigma_s: float
     jitter_s: float
     gyro_bias_rad_s: float
     gyro_scale: float
@@ -130,7 +130,7 @@ def camera_delay(
     whole[np.flatnonzero(inside)[used]] = True
     return CameraDelay(
         delay_s=float(delay),
-        std_s=float(np.sqrt(np.linalg.inv(normal)[0, 0])),
+        sigma_s=float(np.sqrt(np.linalg.inv(normal)[0, 0])),
         jitter_s=0.0 if noise is None else float(np.sqrt(noise.jitter_s2)),
         gyro_bias_rad_s=-float(bias) / scale,
         gyro_scale=float(scale),

@@ -44,7 +44,7 @@ def draw_delay(t_s: Array, residual_rad: Array, rate_rad_s: Array, delay_s: floa
 
 def draw_survey(
     star_m: Array,
-    std_m: Array,
+    sigma_m: Array,
     times_seen: NDArray[np.int64],
     pose: Array,
     residual_px: Array,
@@ -55,7 +55,7 @@ def draw_survey(
 
     Args:
         star_m: Positions, shape (s, 2).
-        std_m: One sigma of the shape, shape (s, 2).
+        sigma_m: One sigma of the shape, shape (s, 2).
         times_seen: Pictures of each star, shape (s,).
         pose: Where the pictures were taken, shape (f, 3).
         residual_px: Of the adjustment, shape (m, 2).
@@ -66,7 +66,7 @@ def draw_survey(
     sky, means, cloud, verified = figure.subplots(2, 2).ravel()
     sky.plot(pose[:, 0], pose[:, 1], "-", color="0.8", linewidth=1, zorder=0)
     dots = sky.scatter(
-        star_m[:, 0], star_m[:, 1], s=8 + 4 * times_seen, c=1e3 * std_m.mean(axis=1), cmap="viridis_r"
+        star_m[:, 0], star_m[:, 1], s=8 + 4 * times_seen, c=1e3 * sigma_m.mean(axis=1), cmap="viridis_r"
     )
     figure.colorbar(dots, ax=sky, label="one sigma per axis (mm)")
     sky.set(

@@ -46,7 +46,7 @@ def lens_from_stars(
         CalibrationRefusedError: Too few pictures can be solved, or they do not determine the lens.
     """
     found = calibrate_intrinsics(
-        pictures, catalogue, camera, wobble_std_m=wobble_m, progress=adjusting(progress)
+        pictures, catalogue, camera, wobble_sigma_m=wobble_m, progress=adjusting(progress)
     )
     return _outcome("Camera intrinsics from the star field", found, len(pictures))
 
@@ -77,7 +77,7 @@ def mount_from_turn(
         pictures,
         catalogue,
         camera,
-        wobble_std_m=wobble_m,
+        wobble_sigma_m=wobble_m,
         first_heading_rad=first_heading_rad,
         progress=adjusting(progress),
     )
@@ -141,8 +141,8 @@ def lens_from_board(
         title="Camera intrinsics from a board",
         summary=f"board seen in {lens.pictures} of {count} pictures, reprojection {rms:.3f} px RMS per axis.",
         quantities={
-            name: Quantity(value, std, UNITS[name])
-            for name, value, std in zip(LENS_NAMES, values, lens.std, strict=True)
+            name: Quantity(value, sigma, UNITS[name])
+            for name, value, sigma in zip(LENS_NAMES, values, lens.sigma, strict=True)
         },
         residual={
             "reprojection_rms": Quantity(rms, math.nan, "px"),
@@ -170,7 +170,7 @@ def _outcome(title: str, found: SkyCalibration, pictures: int) -> Outcome:
         summary=(
             f"{len(found.solved)} of {pictures} pictures used, residual {adjusted.rms_px:.3f} px per axis."
         ),
-        quantities=camera_quantities(camera, adjusted.std_camera),
+        quantities=camera_quantities(camera, adjusted.sigma_camera),
         residual={
             "reprojection_rms": Quantity(adjusted.rms_px, math.nan, "px"),
             "systematic": Quantity(structure.systematic_px, math.nan, "px"),

@@ -15,12 +15,12 @@ UNITS = {
 }
 
 
-def camera_quantities(camera: CameraCalibration, std: Mapping[str, float]) -> dict[str, Quantity]:
+def camera_quantities(camera: CameraCalibration, sigmas: Mapping[str, float]) -> dict[str, Quantity]:
     """The values of a camera that have a standard deviation; with the mount's offset also its yaw."""
     mapping = camera.to_mapping()
     mapping.update(zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion, strict=True))
     mapping["mount_offset_x_m"], mapping["mount_offset_y_m"], _ = camera.mount_offset_body_m
-    found = {name: Quantity(float(mapping[name]), sigma, UNITS[name]) for name, sigma in std.items()}
+    found = {name: Quantity(float(mapping[name]), sigma, UNITS[name]) for name, sigma in sigmas.items()}
     if "mount_offset_x_m" in found:
         found["mount_yaw_rad"] = Quantity(camera.mount_yaw_rad, math.nan, "rad")
     return found

@@ -30,7 +30,7 @@ from calibration.sky.sky_adjustment import (
 )
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import ceiling_points
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
@@ -73,7 +73,7 @@ def calibrate_intrinsics(
     catalogue: StarCatalogue,
     camera: CameraCalibration,
     *,
-    wobble_std_m: float | None = None,
+    wobble_sigma_m: float | None = None,
     progress: Progress | None = None,
 ) -> SkyCalibration:
     """Calibrate focal lengths, principal point and distortion; height and mount are held.
@@ -85,13 +85,13 @@ def calibrate_intrinsics(
         pictures: Spots of the pictures.
         catalogue: The stars.
         camera: First guess of the intrinsics; mount and height as known.
-        wobble_std_m: For pictures made by turning in place: how far the body origin moved.
+        wobble_sigma_m: For pictures made by turning in place: how far the body origin moved.
         progress: Called with the step's number and the residual RMS in px.
 
     Raises:
         SkyCalibrationError: Too few pictures can be solved, or they do not determine the lens.
     """
-    in_place = None if wobble_std_m is None else PosePriorTerm(wobble_std_m)
+    in_place = None if wobble_sigma_m is None else PosePriorTerm(wobble_sigma_m)
     return _calibrate(pictures, catalogue, camera, (*FOCAL, *CENTRE, *DISTORTION), in_place, progress)
 
 
@@ -100,7 +100,7 @@ def calibrate_mount(
     catalogue: StarCatalogue,
     camera: CameraCalibration,
     *,
-    wobble_std_m: float = 1e-3,
+    wobble_sigma_m: float = 1e-3,
     first_heading_rad: float | None = None,
     progress: Progress | None = None,
 ) -> SkyCalibration:
@@ -110,7 +110,7 @@ def calibrate_mount(
         pictures: Spots of the pictures.
         catalogue: The stars.
         camera: Intrinsics, and the mount as far as known.
-        wobble_std_m: How far the body origin may have moved while turning.
+        wobble_sigma_m: How far the body origin may have moved while turning.
         first_heading_rad: True heading of the first solved picture; it gives the yaw.
         progress: Called with the step's number and the residual RMS in px.
 
@@ -118,7 +118,7 @@ def calibrate_mount(
         SkyCalibrationError: Too few pictures can be solved, or the turn is too small.
     """
     found = _calibrate(
-        pictures, catalogue, camera, (*OFFSET, *TILT, *HEIGHT), PosePriorTerm(wobble_std_m), progress
+        pictures, catalogue, camera, (*OFFSET, *TILT, *HEIGHT), PosePriorTerm(wobble_sigma_m), progress
     )
     heading = np.unwrap(found.adjusted.pose[:, 2])
     if float(np.ptp(heading)) < _MIN_SPAN_RAD:
@@ -154,15 +154,15 @@ def _calibrate(
     progress: Progress | None,
 ) -> SkyCalibration:
     star = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
-    std = np.maximum(catalogue.std_m, _EXACT_STAR_STD_M)
-    known = StarPrior(np.arange(len(star)), star, std)
+    sigma = np.maximum(catalogue.sigma_m, _EXACT_STAR_STD_M)
+    known = StarPrior(np.arange(len(star)), star, sigma)
     result: SkyCalibration | None = None
     if "fx" in free:
         camera = _rough_focal_length(pictures, catalogue, camera)
     for tolerance in _TOLERANCES_PX:
         tracker = StarTracker(catalogue, camera, _settings(tolerance))
         answers = [(i, tracker.solve(spots)) for i, spots in enumerate(pictures)]
-        fixes = [(i, fix) for i, fix in answers if isinstance(fix, StarFix)]
+        fixes = [(i, fix) for i, fix in answers if isinstance(fix, PictureFix)]
         if len(fixes) < _MIN_PICTURES:
             raise SkyCalibrationError(
                 f"{len(fixes)} of {len(pictures)} pictures could be solved, {_MIN_PICTURES} are needed"
@@ -198,7 +198,7 @@ def _rough_focal_length(
         scaled = replace(camera, fx=scale * camera.fx, fy=scale * camera.fy)
         tracker = StarTracker(catalogue, scaled, _settings(_TOLERANCES_PX[0]))
         answers = (tracker.solve(spots) for spots in some)
-        stars = sum(answer.stars for answer in answers if isinstance(answer, StarFix))
+        stars = sum(answer.stars for answer in answers if isinstance(answer, PictureFix))
         if stars > most:
             best, most = scaled, stars
     return best
@@ -206,7 +206,7 @@ def _rough_focal_length(
 
 def _matches(
     pictures: Sequence[Spots],
-    fixes: Sequence[tuple[int, StarFix]],
+    fixes: Sequence[tuple[int, PictureFix]],
     star_m: Array,
     camera: CameraCalibration,
     gate_px: float,
@@ -226,7 +226,7 @@ def _matches(
         frames.append(np.full(len(spot), row))
         stars.append(nearest[spot])
         pixels.append(np.stack((spots.u_px[spot], spots.v_px[spot]), axis=1))
-        variance = 0.5 * (spots.cov_px2[spot, 0] + spots.cov_px2[spot, 2])
+        variance = 0.5 * (spots.covariance_px2[spot, 0] + spots.covariance_px2[spot, 2])
         sigmas.append(np.sqrt(variance + _CENTRE_FLOOR_PX**2))
     return Observations(
         np.concatenate(frames), np.concatenate(stars), np.concatenate(pixels), np.concatenate(sigmas)

@@ -59,14 +59,14 @@ class StarPrior:
 
     star: Index
     position_m: Array
-    std_m: Array
+    sigma_m: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosePriorTerm:
     """All body origins are one place, within a standard deviation: a mock-up turned in place."""
 
-    std_m: float
+    sigma_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,8 +77,8 @@ class Adjusted:
         camera: The camera with its free values adjusted.
         pose: x, y, heading of every picture, shape (f, 3).
         star_m: Star positions, shape (s, 2).
-        cov_star_m2: Joint covariance of all star coordinates (x0, y0, x1, ...), (2s, 2s).
-        std_camera: One sigma of every free camera value, by name.
+        covariance_star_m2: Joint covariance of all star coordinates (x0, y0, x1, ...), (2s, 2s).
+        sigma_camera: One sigma of every free camera value, by name.
         residual_px: Observed minus modelled, shape (m, 2).
         used: Which observations were not clipped, shape (m,).
         rms_px: Root mean square per axis of the used residuals.
@@ -87,8 +87,8 @@ class Adjusted:
     camera: CameraCalibration
     pose: Array
     star_m: Array
-    cov_star_m2: Array
-    std_camera: dict[str, float]
+    covariance_star_m2: Array
+    sigma_camera: dict[str, float]
     residual_px: Array
     used: NDArray[np.bool_]
     rms_px: float
@@ -155,10 +155,10 @@ def adjust(
     normal, _ = _normal_equations(camera, pose, star_m, seen, weight, free, known, in_place)
     freedom = max(2 * int(used.sum()) - normal.shape[0], 1)
     total = float((distance2[used]).sum())
-    cov = _inverse(normal) * (total / freedom)
+    covariance = _inverse(normal) * (total / freedom)
     stars = slice(len(free) + pose.size, None)
-    std = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(free)}
-    return Adjusted(camera, pose, star_m, cov[stars, stars], std, residual, used, rms)
+    sigma = {name: float(np.sqrt(covariance[i, i])) for i, name in enumerate(free)}
+    return Adjusted(camera, pose, star_m, covariance[stars, stars], sigma, residual, used, rms)
 
 
 def _stepped(
@@ -229,11 +229,11 @@ def _normal_equations(
     gradient = jacobian.T @ error
     if known is not None:
         row = g + pose.size + 2 * known.star[:, None] + np.arange(2)
-        pull = 1.0 / known.std_m[:, None] ** 2
+        pull = 1.0 / known.sigma_m[:, None] ** 2
         normal[row, row] += np.broadcast_to(pull, row.shape)
         gradient[row] += pull * (known.position_m - star_m[known.star])
     if in_place is not None:
-        pull_in_place = 1.0 / in_place.std_m**2
+        pull_in_place = 1.0 / in_place.sigma_m**2
         frames = len(pose)
         for axis in range(2):
             row = g + 3 * np.arange(frames) + axis

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibration.flights import read_flight
 from groundstation.declarations.errors import UsageError
-from groundstation.files.tables import load_table
+from groundstation.files.number_tables import load_table
 
 Array = NDArray[np.float64]
 

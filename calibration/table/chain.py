@@ -70,7 +70,7 @@ class Innovation:
     """(2,) with all unknowns zero; m or m/s."""
     columns: Array
     """(2, NUISANCES + 2 + m): value = columns @ unknowns + noise."""
-    cov: Array
+    covariance: Array
     """(2, 2) of the noise."""
 
 
@@ -114,17 +114,17 @@ def innovations(
         H = np.zeros((2, 6))
         if fix >= 0:
             H[:, 2:4] = np.eye(2)
-            measured, cov = _fix_columns(log, fix, arm, size), log.fix_cov_m2[fix]
+            measured, covariance = _fix_columns(log, fix, arm, size), log.fix_covariance_m2[fix]
         else:
             H[:, 0:2] = np.eye(2)
-            measured, cov = np.zeros((2, 1 + size)), np.eye(2) * STILL_SIGMA_M_S**2
+            measured, covariance = np.zeros((2, 1 + size)), np.eye(2) * STILL_SIGMA_M_S**2
         E = measured - H @ S
-        C = H @ P @ H.T + cov
+        C = H @ P @ H.T + covariance
         yield Innovation(t, fix >= 0, t - last_fix, E[:, 0], -E[:, 1:], C)
         K = np.linalg.solve(C, H @ P).T
         S = S + K @ E
         L = np.eye(6) - K @ H
-        P = L @ P @ L.T + K @ cov @ K.T
+        P = L @ P @ L.T + K @ covariance @ K.T
         if fix >= 0:
             last_fix = t
 

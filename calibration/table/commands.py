@@ -53,7 +53,7 @@ def table_map(
         sources = [read_source(path, rig, vehicle) for path in flights]
         legs = legs or next((dict(source.legs_m) for source in sources if source.legs_m), {})
         fit, made = map_of_sources(sources, given, shortest_wave_m)
-        advice = levelling(made.mean_m_s2, made.mean_cov_m2_s4, legs) if legs else None
+        advice = levelling(made.mean_m_s2, made.mean_covariance_m2_s4, legs) if legs else None
         sentences = summary_of(fit, made, advice)
         if check is not None:
             sentences += check_on(read_source(check, rig, vehicle), made)

@@ -67,7 +67,7 @@ class FlightEquations:
     """(NUISANCES,)."""
     response: Array
     """(NUISANCES, 2 + m)."""
-    own_cov: Array
+    own_covariance: Array
     """(NUISANCES, NUISANCES) with slope and field known."""
     headings_rad: float
     """How far the heading turned while fixes were taken: largest less smallest."""
@@ -80,13 +80,13 @@ class FlightEquations:
         r = 1.0 / variance_ratio
         return replace(
             self, information=self.information * r, vector=self.vector * r, power=self.power * r,
-            own_cov=self.own_cov * variance_ratio,
+            own_covariance=self.own_covariance * variance_ratio,
         )  # fmt: skip
 
-    def unknowns(self, shared: Array, shared_cov: Array) -> tuple[Array, Array]:
+    def unknowns(self, shared: Array, shared_covariance: Array) -> tuple[Array, Array]:
         """Return the flight's own unknowns (NUISANCES,) and their covariance."""
         value = self.own - self.response @ shared
-        return value, self.own_cov + self.response @ shared_cov @ self.response.T
+        return value, self.own_covariance + self.response @ shared_covariance @ self.response.T
 
 
 def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> FlightEquations:
@@ -101,9 +101,9 @@ def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> Flig
     filled = fixes = 0
     for innovation in innovations(log, field, priors.bias_walk_m_s2_rts):
         fixes += innovation.is_fix
-        if innovation.cov.trace() > 1.0:
+        if innovation.covariance.trace() > 1.0:
             continue  # the first fix, which only says where the motion starts
-        root = np.linalg.cholesky(innovation.cov)
+        root = np.linalg.cholesky(innovation.covariance)
         white = solve_triangular(
             root, np.column_stack([innovation.value, innovation.columns]), lower=True, check_finite=False
         )

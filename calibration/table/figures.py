@@ -39,7 +39,7 @@ def draw_map(
     figure = new_figure(15.0, 8.6)
     figure.set_layout_engine("constrained", h_pad=0.1)
     places = figure.add_gridspec(2, 2, width_ratios=[1.9, 1.0], hspace=0.12)
-    veil = np.hypot(made.std_x_m_s2, made.std_y_m_s2) / np.sqrt(2.0) > UNKNOWN * waviness_m_s2
+    veil = np.hypot(made.sigma_x_m_s2, made.sigma_y_m_s2) / np.sqrt(2.0) > UNKNOWN * waviness_m_s2
     _draw_waves(figure, figure.add_subplot(places[:, 0]), made, veil, logs, legs, advice)
     _draw_relief(figure, figure.add_subplot(places[0, 1]), made, veil)
     _draw_sigma(figure, figure.add_subplot(places[1, 1]), made, logs)
@@ -71,9 +71,9 @@ def _draw_waves(
     _draw_arrows(axes, made, veil, wave_x, wave_y)
     _veil(axes, made, veil)
     _draw_legs(axes, made, legs, advice)
-    mean, std = 1e3 * np.array(made.mean_m_s2), 1e3 * np.sqrt(made.mean_cov_m2_s4.diagonal())
+    mean, sigma = 1e3 * np.array(made.mean_m_s2), 1e3 * np.sqrt(made.mean_covariance_m2_s4.diagonal())
     title = (
-        f"Mean slope x {mean[0]:+.2f} ± {std[0]:.2f}, y {mean[1]:+.2f} ± {std[1]:.2f} mm/s² "
+        f"Mean slope x {mean[0]:+.2f} ± {sigma[0]:.2f}, y {mean[1]:+.2f} ± {sigma[1]:.2f} mm/s² "
         f"({mean[0] / G_M_S2:+.3f}, {mean[1] / G_M_S2:+.3f} mrad)"
     )
     if advice is not None and advice.is_level:
@@ -92,7 +92,7 @@ def _draw_legs(axes: Axes, made: TableMap, legs: Legs, advice: Levelling | None)
     for leg in advice.legs:
         x, y = legs[leg.name]
         axes.plot(x, y, "s", color="tab:blue", markersize=9, zorder=5, clip_on=False)
-        words = f"raise {leg.name} by {1e3 * leg.raise_m:.2f} ± {1e3 * leg.std_m:.2f} mm"
+        words = f"raise {leg.name} by {1e3 * leg.raise_m:.2f} ± {1e3 * leg.sigma_m:.2f} mm"
         text = axes.annotate(
             words if leg.must_be_raised else f"{leg.name} stays",
             (x, y),
@@ -139,7 +139,7 @@ def _draw_relief(figure: Figure, axes: Axes, made: TableMap, veil: NDArray[np.bo
 
 
 def _draw_sigma(figure: Figure, axes: Axes, made: TableMap, logs: Sequence[FlightLog]) -> None:
-    sigma = 1e3 * np.hypot(made.std_x_m_s2, made.std_y_m_s2) / np.sqrt(2.0)
+    sigma = 1e3 * np.hypot(made.sigma_x_m_s2, made.sigma_y_m_s2) / np.sqrt(2.0)
     image = axes.imshow(
         sigma, origin="lower", extent=_extent(made), cmap="viridis_r", vmin=0.0, interpolation="bilinear"
     )

@@ -37,7 +37,7 @@ class FlightLog:
     """(k,) exposures on the packets' clock (later by the accelerometers' lag), rising."""
     fix_position_m: Array
     """(k, 2)."""
-    fix_cov_m2: Array
+    fix_covariance_m2: Array
     """(k, 2, 2)."""
     fix_heading_rad: Array
     """(k,) smoothed."""
@@ -53,7 +53,7 @@ class FlightLog:
     def __post_init__(self) -> None:
         n, k = len(self.end_s), len(self.fix_s)
         packet = {"span_s", "force_body_m_s2", "warmth_k", "heading_rad", "position_table_m", "is_hole"}
-        fix = {"fix_position_m", "fix_cov_m2", "fix_heading_rad", "fix_velocity_m_s"}
+        fix = {"fix_position_m", "fix_covariance_m2", "fix_heading_rad", "fix_velocity_m_s"}
         for field in fields(self):
             wanted = n if field.name in packet else k if field.name in fix else None
             if wanted is not None:

@@ -30,25 +30,25 @@ def map_of(fit: SurfaceFit, provenance: MapProvenance) -> TableMap:
     for row, line in enumerate(places):
         acceleration[row] = fit.acceleration_m_s2(line)
         potential[row] = fit.basis.potentials(line) @ fit.shared[2:]
-    mean, cov = fit.mean_over(places.reshape(-1, 2)[:: max(1, places.size // 8000)])
+    mean, covariance = fit.mean_over(places.reshape(-1, 2)[:: max(1, places.size // 8000)])
     off = places - places.reshape(-1, 2).mean(axis=0)
     # what the mean over the table holds of the waves belongs to the plane, not to the height about it
     plane = off @ (mean - fit.shared[:2])
     height = -(potential - plane) / G_M_S2
     height -= height.mean()
-    std = _std_on(fit, x, y)
-    far = math.hypot(fit.waviness_m_s2, math.sqrt(float(cov.diagonal().max())))
+    sigma = _sigma_on(fit, x, y)
+    far = math.hypot(fit.waviness_m_s2, math.sqrt(float(covariance.diagonal().max())))
     return TableMap(
-        float(x[0]), float(y[0]), step, acceleration[..., 0], acceleration[..., 1], std[..., 0], std[..., 1],
-        height, (float(mean[0]), float(mean[1])), cov, far, provenance,
+        float(x[0]), float(y[0]), step, acceleration[..., 0], acceleration[..., 1],
+        sigma[..., 0], sigma[..., 1], height, (float(mean[0]), float(mean[1])), covariance, far, provenance,
     )  # fmt: skip
 
 
-def _std_on(fit: SurfaceFit, x: Array, y: Array) -> Array:
+def _sigma_on(fit: SurfaceFit, x: Array, y: Array) -> Array:
     """Return the sigma (rows, columns, 2), found at every other point, where it is smooth enough."""
     coarse_x, coarse_y = np.unique([*x[::2], x[-1]]), np.unique([*y[::2], y[-1]])
     places = np.stack(np.meshgrid(coarse_x, coarse_y), axis=-1)
-    std = fit.std_m_s2(places.reshape(-1, 2)).reshape(places.shape)
-    between = RegularGridInterpolator((coarse_y, coarse_x), std)
+    sigma = fit.sigma_m_s2(places.reshape(-1, 2)).reshape(places.shape)
+    between = RegularGridInterpolator((coarse_y, coarse_x), sigma)
     wanted = np.stack(np.meshgrid(x, y), axis=-1)[..., ::-1]
     return np.asarray(between(wanted))

@@ -82,10 +82,10 @@ def check_outages(
 def _own_unknowns(log: FlightLog, field: _Known, priors: FlightPriors) -> Array:
     J, h = np.diag(1.0 / priors.variances()), np.zeros(NUISANCES)
     for innovation in innovations(log, field, priors.bias_walk_m_s2_rts):
-        if innovation.cov.trace() > 1.0:
+        if innovation.covariance.trace() > 1.0:
             continue
         A = innovation.columns[:, :NUISANCES]
-        weight = np.linalg.inv(innovation.cov)
+        weight = np.linalg.inv(innovation.covariance)
         J += A.T @ weight @ A
         h += A.T @ weight @ (innovation.value - innovation.columns[:, -1])
     return np.asarray(np.linalg.solve(J, h))

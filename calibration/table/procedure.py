@@ -40,11 +40,11 @@ def map_of_sources(
 
 def summary_of(fit: SurfaceFit, made: TableMap, advice: Levelling | None) -> list[str]:
     """Return what was found, a sentence each."""
-    std = np.sqrt(made.mean_cov_m2_s4.diagonal())
+    sigma = np.sqrt(made.mean_covariance_m2_s4.diagonal())
     lines = [
         "Mean acceleration "
         + ", ".join(
-            f"{axis} {1e3 * made.mean_m_s2[k]:+.3f} ± {1e3 * std[k]:.3f} mm/s²"
+            f"{axis} {1e3 * made.mean_m_s2[k]:+.3f} ± {1e3 * sigma[k]:.3f} mm/s²"
             f" ({1e3 * made.mean_m_s2[k] / G_M_S2:+.3f} mrad)"
             for k, axis in enumerate("xy")
         )

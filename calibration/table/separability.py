@@ -25,20 +25,20 @@ class Separability:
     flight: str
     turned_rad: float
     bias_m_s2: tuple[float, float]
-    bias_std_m_s2: tuple[float, float]
-    pull_std_m_s2: tuple[float, float]
+    bias_sigma_m_s2: tuple[float, float]
+    pull_sigma_m_s2: tuple[float, float]
     correlation: float
     """Largest canonical correlation of bias and pull."""
 
     @property
     def is_separated(self) -> bool:
         """Whether the pull is known well enough for a map, whatever the bias is."""
-        return max(self.pull_std_m_s2) < ENOUGH_M_S2
+        return max(self.pull_sigma_m_s2) < ENOUGH_M_S2
 
     def sentence(self) -> str:
         """Return the verdict in words."""
         turned = f"{math.degrees(self.turned_rad):.0f}°"
-        known = f"(correlation {self.correlation:.2f}, slope ± {1e3 * max(self.pull_std_m_s2):.2f} mm/s²)"
+        known = f"(correlation {self.correlation:.2f}, slope ± {1e3 * max(self.pull_sigma_m_s2):.2f} mm/s²)"
         if self.is_separated:
             return (
                 f"{self.flight}: the heading turned through {turned}, bias and slope are separated {known}."
@@ -56,21 +56,21 @@ def separability(fit: SurfaceFit) -> list[Separability]:
     """Judge each flight of a fit."""
     out = []
     for flight in fit.flights:
-        value, cov = flight.unknowns(fit.shared, fit.cov)
+        value, covariance = flight.unknowns(fit.shared, fit.shared_covariance)
         A = fit.design(flight.centre_m[None])[0]
-        bias_cov, pull_cov = cov[BIAS, BIAS], A @ fit.cov @ A.T
-        cross = -(flight.response @ fit.cov)[BIAS] @ A.T
-        bias_root, pull_root = np.linalg.cholesky(bias_cov), np.linalg.cholesky(pull_cov)
+        bias_covariance, pull_covariance = covariance[BIAS, BIAS], A @ fit.shared_covariance @ A.T
+        cross = -(flight.response @ fit.shared_covariance)[BIAS] @ A.T
+        bias_root, pull_root = np.linalg.cholesky(bias_covariance), np.linalg.cholesky(pull_covariance)
         whitened = np.linalg.solve(pull_root, np.linalg.solve(bias_root, cross).T)
         correlation = float(np.linalg.svd(whitened, compute_uv=False)[0])
-        bias_std, pull_std = np.sqrt(bias_cov.diagonal()), np.sqrt(pull_cov.diagonal())
+        bias_sigma, pull_sigma = np.sqrt(bias_covariance.diagonal()), np.sqrt(pull_covariance.diagonal())
         out.append(
             Separability(
                 flight=flight.name,
                 turned_rad=flight.headings_rad,
                 bias_m_s2=(float(value[0]), float(value[1])),
-                bias_std_m_s2=(float(bias_std[0]), float(bias_std[1])),
-                pull_std_m_s2=(float(pull_std[0]), float(pull_std[1])),
+                bias_sigma_m_s2=(float(bias_sigma[0]), float(bias_sigma[1])),
+                pull_sigma_m_s2=(float(pull_sigma[0]), float(pull_sigma[1])),
                 correlation=correlation,
             )
         )

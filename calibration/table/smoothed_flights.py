@@ -16,7 +16,7 @@ from calibration.outcome import CalibrationRefusedError
 from calibration.table.flight_log import FlightLog
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
-from groundstation.fusion.estimator import Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.flight_data import estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
@@ -50,7 +50,7 @@ class _Tap(OfflineSmoother):
         super().__init__(noise)
         self.packets: list[ImuPacket] = []
         self.fixes: list[Fix] = []
-        self.accounts: dict[int, FixAccount] = {}
+        self.accounts: dict[int, FixOutcome] = {}
         self.rests_ns: list[tuple[int, int | None]] = []
 
     def begin_rest(self, t_ns: int) -> None:
@@ -67,13 +67,13 @@ class _Tap(OfflineSmoother):
         self.packets.append(packet)
         return super().add_imu(packet)
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         account = super().add_fix(fix)
         self.fixes.append(fix)
         self.accounts[account.t_exposure_ns] = account
         return account
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         late = super().settled()
         self.accounts.update((account.t_exposure_ns, account) for account in late)
         return late
@@ -146,8 +146,8 @@ def _flight_log(name: str, tap: _Tap) -> FlightLog:
     fixes = [f for f in fixes if t[0] <= (f.t_exposure_ns - origin_ns) * 1e-9 <= t[-1]]
     exposure = np.array([f.t_exposure_ns - origin_ns for f in fixes]) * 1e-9
     velocity = np.column_stack([np.interp(exposure, t, smoothed[:, k]) for k in (3, 4)])
-    cov = np.array([f.cov[:2, :2] for f in fixes]).reshape(-1, 2, 2)
-    cov = cov + noise.fix_time_sigma_s**2 * velocity[:, :, None] * velocity[:, None, :]
+    covariance = np.array([f.covariance[:2, :2] for f in fixes]).reshape(-1, 2, 2)
+    covariance = covariance + noise.fix_time_sigma_s**2 * velocity[:, :, None] * velocity[:, None, :]
     return FlightLog(
         name=name,
         end_s=end,
@@ -159,7 +159,7 @@ def _flight_log(name: str, tap: _Tap) -> FlightLog:
         is_hole=~good,
         fix_s=exposure + noise.acc_lag_s,
         fix_position_m=np.array([(f.x_m, f.y_m) for f in fixes]).reshape(-1, 2),
-        fix_cov_m2=cov,
+        fix_covariance_m2=covariance,
         fix_heading_rad=np.interp(exposure, t, smoothed[:, 2]),
         fix_velocity_m_s=velocity,
         rests_s=rests,

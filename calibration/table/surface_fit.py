@@ -29,7 +29,7 @@ class SurfaceFit:
     basis: SurfaceBasis
     shared: Array
     """(2 + m,) slope m/s^2, amplitudes of the modes."""
-    cov: Array
+    shared_covariance: Array
     """(2 + m, 2 + m)."""
     waviness_m_s2: float
     """Prior standard deviation of the pull about the slope, by evidence."""
@@ -55,11 +55,14 @@ class SurfaceFit:
     def covariance(self, position_m: Array) -> Array:
         """Return its joint covariance (2 n, 2 n), x and y alternating."""
         A = self.design(position_m).reshape(2 * len(position_m), -1)
-        return np.asarray(A @ self.cov @ A.T)
+        return np.asarray(A @ self.shared_covariance @ A.T)
 
-    def std_m_s2(self, position_m: Array) -> Array:
+    def sigma_m_s2(self, position_m: Array) -> Array:
         """Return its standard deviations (n, 2)."""
-        root = np.linalg.cholesky(self.cov + np.eye(len(self.cov)) * (1e-12 * self.cov.diagonal().max()))
+        root = np.linalg.cholesky(
+            self.shared_covariance
+            + np.eye(len(self.shared_covariance)) * (1e-12 * self.shared_covariance.diagonal().max())
+        )
         out = np.empty((len(position_m), 2))
         for k in range(0, len(position_m), 256):
             spread = self.design(position_m[k : k + 256]) @ root
@@ -72,7 +75,7 @@ class SurfaceFit:
         for k in range(0, len(position_m), 512):
             A += self.design(position_m[k : k + 512]).sum(axis=0)
         A /= len(position_m)
-        return A @ self.shared, A @ self.cov @ A.T
+        return A @ self.shared, A @ self.shared_covariance @ A.T
 
 
 def fit_surface(
@@ -97,8 +100,8 @@ def fit_surface(
         h = np.sum([flight.vector for flight in scaled], axis=0)
         waviness, length = _most_evident(J, h, basis, slope_sigma_m_s2)
         prior = _prior(basis, waviness, length, slope_sigma_m_s2)
-        shared, cov = _posterior(J, h, prior)
-        learned = float(np.einsum("ij,ji->", cov, J))
+        shared, covariance = _posterior(J, h, prior)
+        learned = float(np.einsum("ij,ji->", covariance, J))
         rows = sum(flight.rows for flight in flights)
         power = sum(flight.power for flight in scaled)
         left = (power - 2.0 * float(h @ shared) + float(shared @ J @ shared)) * factor
@@ -107,7 +110,7 @@ def fit_surface(
             break
         factor = ratio
     return SurfaceFit(
-        basis, shared, cov, waviness, length, ratio, factor, rows, learned, tuple(scaled)
+        basis, shared, covariance, waviness, length, ratio, factor, rows, learned, tuple(scaled)
     )  # fmt: skip
 
 
@@ -119,8 +122,8 @@ def _posterior(J: Array, h: Array, prior: Array) -> tuple[Array, Array]:
     root = np.sqrt(prior)
     B = np.eye(len(prior)) + root[:, None] * J * root
     inverse = cho_solve(cho_factor(B), np.eye(len(prior)))
-    cov = root[:, None] * inverse * root
-    return cov @ h, cov
+    covariance = root[:, None] * inverse * root
+    return covariance @ h, covariance
 
 
 def _most_evident(J: Array, h: Array, basis: SurfaceBasis, slope_sigma: float) -> tuple[float, float]:

@@ -17,9 +17,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from drivers.imu_block.block_frames import TICK_NS, ImuFrame
 from drivers.imu_block.frame_v1 import V1_WIRE_BYTES
 from drivers.imu_block.frame_v2 import V2_WIRE_BYTES
-from drivers.imu_block.frames import TICK_NS, ImuFrame
 from drivers.imu_block.lower_envelope import BLOCK_NS, DRIFT_LIMIT, LowerEnvelope
 
 FTDI_PACKET_BYTES = 62
@@ -46,14 +46,14 @@ class TickStamp(NamedTuple):
 
     Attributes:
         stamp_ns: host monotonic time of the window's end; strictly increasing from frame to frame.
-        stamp_std_s: standard deviation of the stamp, the common delay of all packets included.
+        stamp_sigma_s: standard deviation of the stamp, the common delay of all packets included.
         tick: tick of the window's end since the block started, unwrapped.
         elapsed_ticks: ticks since the previous frame, None where the block (re)started. Integrate with these.
         epoch: +1 at each restart of the block.
     """
 
     stamp_ns: int
-    stamp_std_s: float
+    stamp_sigma_s: float
     tick: int
     elapsed_ticks: int | None
     epoch: int
@@ -209,9 +209,9 @@ class TickClock:
             if self.is_locked and elapsed is not None:
                 stamp_ns = min(stamp_ns, self._last_stamp_ns + math.floor(nominal_ns * (1 + limit)))
         self._last_stamp_ns = stamp_ns
-        return TickStamp(stamp_ns, self._std_s(stamp_ns - wanted_ns), tick, elapsed, self.epoch)
+        return TickStamp(stamp_ns, self._sigma_s(stamp_ns - wanted_ns), tick, elapsed, self.epoch)
 
-    def _std_s(self, lag_ns: int) -> float:
+    def _sigma_s(self, lag_ns: int) -> float:
         envelope = self._envelope
         first_guess_ns = max(self._timer_ns, 1e6) + FIRST_JITTER_NS
         line_ns = max(envelope.scatter_ns, 20e3) + 2 * first_guess_ns / (envelope.points_seen + 1)

@@ -12,8 +12,8 @@ limits of what the sensors can give.
 import math
 import struct
 
+from drivers.imu_block.block_frames import FIXED_POINT, GYRO_CODE_MAX, TILT_CODE_MAX, ImuFrame
 from drivers.imu_block.counters import ParserCounters
-from drivers.imu_block.frames import FIXED_POINT, GYRO_CODE_MAX, TILT_CODE_MAX, ImuFrame
 
 SYNC = 0xA5
 V1_WIRE_BYTES = 9

@@ -10,9 +10,7 @@
 import struct
 from collections.abc import Iterable
 
-from drivers.imu_block.counters import ParserCounters
-from drivers.imu_block.frame_v1 import to_fixed
-from drivers.imu_block.frames import (
+from drivers.imu_block.block_frames import (
     FIXED_POINT,
     GYRO_CODE_MAX,
     TILT_CODE_MAX,
@@ -24,6 +22,8 @@ from drivers.imu_block.frames import (
     Pong,
     Reply,
 )
+from drivers.imu_block.counters import ParserCounters
+from drivers.imu_block.frame_v1 import to_fixed
 from drivers.imu_block.packet import PacketSplitter, seal, unseal
 
 V2_WIRE_BYTES = 21

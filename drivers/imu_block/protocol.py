@@ -4,7 +4,7 @@ The byte tables are in ``docs/interfaces/imu_block.md``. This module finds out w
 and re-exports everything that drivers and emulator need.
 """
 
-from drivers.imu_block.commands import (
+from drivers.imu_block.block_commands import (
     BadCommand,
     Command,
     CommandParser,
@@ -20,10 +20,7 @@ from drivers.imu_block.commands import (
     encode_self_test,
     encode_set_averaging,
 )
-from drivers.imu_block.counters import ParserCounters
-from drivers.imu_block.frame_v1 import V1_WIRE_BYTES, V1Parser, encode_v1
-from drivers.imu_block.frame_v2 import V2_WIRE_BYTES, V2Parser, encode_reply, encode_v2
-from drivers.imu_block.frames import (
+from drivers.imu_block.block_frames import (
     TICK_NS,
     Ack,
     AckResult,
@@ -35,6 +32,9 @@ from drivers.imu_block.frames import (
     Reply,
     Status,
 )
+from drivers.imu_block.counters import ParserCounters
+from drivers.imu_block.frame_v1 import V1_WIRE_BYTES, V1Parser, encode_v1
+from drivers.imu_block.frame_v2 import V2_WIRE_BYTES, V2Parser, encode_reply, encode_v2
 
 __all__ = [
     "TICK_NS",

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from enum import IntFlag
 
-from drivers.imu_block.frames import HousekeepingItem, ImuFrame, Status
+from drivers.imu_block.block_frames import HousekeepingItem, ImuFrame, Status
 
 STANDARD_GRAVITY_M_S2 = 9.80665  # by definition, CGPM 1901
 

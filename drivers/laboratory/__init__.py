@@ -2,7 +2,7 @@
 
 from drivers.laboratory.announcement import Address, encode_announcement, parse_announcement
 from drivers.laboratory.channels import ENTRY_POINT_GROUP, Arrival, ChannelKind, Laboratory, load_laboratory
-from drivers.laboratory.failures import (
+from drivers.laboratory.failure_lines import (
     LABORATORY_CHANNEL,
     FailureEvent,
     FailureRefused,
@@ -12,7 +12,7 @@ from drivers.laboratory.failures import (
     parse_event,
     parse_order,
 )
-from drivers.star_camera.frame import CameraFrame
+from drivers.star_camera.camera_frame import CameraFrame
 from drivers.valve_bus.frame import CanFrame
 
 __all__ = [

@@ -23,7 +23,7 @@ class ChannelKind(StrEnum):
     BYTES = "bytes"
     """`bytes`: a chunk as one read would return it."""
     CAMERA = "camera"
-    """`drivers.star_camera.frame.CameraFrame`: one picture."""
+    """`drivers.star_camera.camera_frame.CameraFrame`: one picture."""
     CAN = "can"
     """`drivers.valve_bus.frame.CanFrame`, both ways."""
     FAILURES = "failures"

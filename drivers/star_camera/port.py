@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from drivers.errors import DeviceError, LinkLost
-from drivers.star_camera.frame import CameraFrame
+from drivers.star_camera.camera_frame import CameraFrame
 from drivers.star_camera.source import PictureSource, open_source
 
 SILENCE_S = 2.0

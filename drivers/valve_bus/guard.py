@@ -89,6 +89,7 @@ class Guard:
 
     def update(self, stamp_ns: int, command: ValveCommand) -> Verdict:
         """Judge a command that arrived at `stamp_ns`. On NEW_PULSE a tick may follow at once."""
+        self._counters.commands += 1
         now_ns = self._advance(stamp_ns)
         verdict = self._judge(now_ns, command)
         match verdict:

@@ -35,6 +35,7 @@ class GuardCounters:
     """What happened since the guard began."""
 
     commands: int = 0
+    """Received, whatever became of them."""
     new_pulses: int = 0
     superseded_pulses: int = 0
     """Replaced by a newer pulse before a tick could send them."""

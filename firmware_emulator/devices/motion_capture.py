@@ -17,7 +17,7 @@ from drivers.laboratory import ChannelKind
 from drivers.motion_capture.pose import MotionCapturePose
 from firmware_emulator.device_kind import DeviceKind
 from firmware_emulator.devices.pending import take_until
-from firmware_emulator.devices.turns import Quaternion, Triple, about_z, inverse, small, times, turned
+from firmware_emulator.devices.quaternions import Quaternion, Triple, about_z, inverse, small, times, turned
 from firmware_emulator.failures import NS_PER_S, FailureKind
 from firmware_emulator.scenario import MockUp, Site
 from firmware_emulator.settings import NonNegative, Positive, Settings

@@ -1,4 +1,4 @@
-"""The laboratory's own channel live: JSON lines over TCP (`drivers.laboratory.failures`)."""
+"""The laboratory's own channel live: JSON lines over TCP (`drivers.laboratory.failure_lines`)."""
 
 from drivers.laboratory import (
     Address,
@@ -7,7 +7,7 @@ from drivers.laboratory import (
     encode_event,
     parse_order,
 )
-from drivers.laboratory.failures import MAX_LINE_BYTES
+from drivers.laboratory.failure_lines import MAX_LINE_BYTES
 from firmware_emulator.live.served import LiveChannel
 from firmware_emulator.live.tcp_server import Client, TcpServer
 

@@ -37,7 +37,7 @@ class Journal(Message):
 class Kind(IntEnum):
     """What happened."""
 
-    START = 0  # sequence is a CRC-32 of configuration and calibration
+    START = 0  # the node was started in the process that stands as owner; sequence is 0
     INPUT = 1  # the node consumed (noun, owner, sequence)
     TICK = 2  # the node was ticked
     OUTPUT = 3  # the node published (noun, owner, sequence)

@@ -15,11 +15,11 @@ from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Estimator, FixAccount, PlanarState
+from groundstation.fusion.estimator import Estimator, FixOutcome, PlanarState
+from groundstation.fusion.estimators import ESTIMATORS
 from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
-from groundstation.fusion.registry import ESTIMATORS
 from groundstation.fusion.slope_grid import noise_with, slope_grid
 from groundstation.fusion.table_map import TableMap
 
@@ -101,7 +101,7 @@ def _estimate_lines(data: FlightData, states: list[PlanarState | None]) -> Itera
         yield f"{t:.6f}" + (empty if state is None else form % state[1:13])
 
 
-def _fix_lines(accounts: list[FixAccount]) -> Iterator[str]:
+def _fix_lines(accounts: list[FixOutcome]) -> Iterator[str]:
     yield FIXES_HEADER
     for a in accounts:
         yield (
@@ -110,7 +110,7 @@ def _fix_lines(accounts: list[FixAccount]) -> Iterator[str]:
         )
 
 
-def _summarise(states: list[PlanarState | None], accounts: list[FixAccount], estimator: Estimator) -> None:
+def _summarise(states: list[PlanarState | None], accounts: list[FixOutcome], estimator: Estimator) -> None:
     used = sum(account.used for account in accounts)
     print(f"{len(states)} packets, {len(accounts)} fixes, {used} used.")
     for name, count in sorted(estimator.counters.by_name.items()):

@@ -11,11 +11,11 @@ import typer
 from groundstation.cli.progress import with_progress
 from groundstation.data_sets.star_folder import find_frames, read_frame
 from groundstation.files.errors import FileError
-from groundstation.files.tables import csv_text
+from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, write_file
+from groundstation.overhead.circle_tracker import NoOverheadFix, OverheadFix, OverheadTracker
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
 
 COLUMNS = (
     "frame",
@@ -66,7 +66,7 @@ def _row(frame: str, answer: OverheadFix | NoOverheadFix, ms: float) -> list[str
     if isinstance(answer, NoOverheadFix):
         return [frame, answer.vehicle, "0", "", "", "", f"{ms:.3f}", "0", "", "", "", "", answer.reason]
     pose = (answer.x_m, answer.y_m, answer.heading_rad)
-    std = np.sqrt(np.diag(answer.cov)).tolist()
+    sigma = np.sqrt(np.diag(answer.covariance)).tolist()
     return [
         frame,
         answer.vehicle,
@@ -74,6 +74,6 @@ def _row(frame: str, answer: OverheadFix | NoOverheadFix, ms: float) -> list[str
         *(f"{value:.7f}" for value in pose),
         f"{ms:.3f}",
         str(answer.circles),
-        *(f"{value:.3e}" for value in (*std, answer.misfit_m)),
+        *(f"{value:.3e}" for value in (*sigma, answer.misfit_m)),
         "",
     ]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.files.png import write_png
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import detect
-from groundstation.star_tracking.fixes import NoFix, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix
 from groundstation.star_tracking.picture_drawing import draw_notes
 from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -31,7 +31,7 @@ class PictureFolder:
     catalogue: StarCatalogue
     every: bool
 
-    def note(self, name: str, image: NDArray[np.uint8], answer: StarFix | NoFix) -> None:
+    def note(self, name: str, image: NDArray[np.uint8], answer: PictureFix | NoFix) -> None:
         """Write the picture if it is wanted.
 
         Raises:

@@ -19,11 +19,11 @@ from groundstation.cli.progress import with_progress
 from groundstation.cli.star_pictures import PictureFolder
 from groundstation.data_sets.star_folder import find_frames, load_sky, read_frame
 from groundstation.declarations.errors import UsageError
-from groundstation.files.tables import csv_text
+from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, whole_folder, write_file
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
-from groundstation.star_tracking.fixes import NoFix, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix
 from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
@@ -104,7 +104,7 @@ def solve(
 
 def _solver(
     method: Method, camera: CameraCalibration, catalogue: StarCatalogue
-) -> Callable[[NDArray[np.uint8]], StarFix | NoFix]:
+) -> Callable[[NDArray[np.uint8]], PictureFix | NoFix]:
     if method is Method.PUBLISHED:
         published = PublishedTracker(catalogue, camera)
         return lambda image: published.solve(detect(image))
@@ -112,11 +112,11 @@ def _solver(
     return lambda image: tracker.solve(detector.find(image))
 
 
-def _row(frame: str, answer: StarFix | NoFix, ms: float) -> list[str]:
+def _row(frame: str, answer: PictureFix | NoFix, ms: float) -> list[str]:
     if isinstance(answer, NoFix):
         return [frame, "0", "", "", "", f"{ms:.3f}", "0", "", "", "", answer.reason.value]
     pose = (answer.x_m, answer.y_m, answer.heading_rad)
-    spread = (answer.std_x_m, answer.std_y_m, answer.std_heading_rad)
+    spread = (answer.sigma_x_m, answer.sigma_y_m, answer.sigma_heading_rad)
     if not all(math.isfinite(value) for value in (*pose, *spread)):
         raise AssertionError(f"frame {frame}: the solver gave a fix that is not finite")
     return [

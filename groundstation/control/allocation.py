@@ -14,9 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.state import Wrench
+from groundstation.control.state import BodyWrench
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 MAX_VALVES = 12  # candidates grow as n^3 times the ties of a symmetric layout
 _SLACK = 1e-9  # duty below 0 or above 1 that is rounding
@@ -45,7 +45,7 @@ class Allocator:
         self._fixed = np.array([fixed for _, _, fixed, _ in candidates])
         self._fixed_count = self._fixed.sum(axis=1)
 
-    def allocate(self, wrench: Wrench, *, sparse: bool = False) -> NDArray[np.float64]:
+    def allocate(self, wrench: BodyWrench, *, sparse: bool = False) -> NDArray[np.float64]:
         """Duties that make the wrench (shortened by the envelope where it must be) with the least gas.
 
         Args:

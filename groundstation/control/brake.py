@@ -9,9 +9,9 @@ import math
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.state import ControlState, Wrench, limit_length, rotate
+from groundstation.control.state import BodyWrench, ControlState, limit_length, rotate
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
 
@@ -37,7 +37,7 @@ class BrakeConfig(BaseModel):
 
 def brake_wrench(
     state: ControlState, config: BrakeConfig, vehicle: VehicleModel, envelope: WrenchEnvelope
-) -> Wrench:
+) -> BodyWrench:
     """Wrench that takes speed and turn away, within the valves.
 
     Args:
@@ -57,4 +57,4 @@ def brake_wrench(
     turning = max(0.0, abs(state.rate_rad_s) - math.radians(config.rest_rate_deg_s))
     torque = vehicle.inertia_kg_m2 * config.damping_per_s * turning
     torque = min(torque, config.torque_share * envelope.max_torque_nm)
-    return envelope.saturate(Wrench(against, -math.copysign(torque, state.rate_rad_s)))
+    return envelope.saturate(BodyWrench(against, -math.copysign(torque, state.rate_rad_s)))

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Protocol
 
-from groundstation.control.state import ControlState, Goal, Wrench
+from groundstation.control.state import BodyWrench, ControlState, Goal
 
 NO_NEIGHBOURS: Mapping[str, ControlState] = MappingProxyType({})
 
@@ -24,9 +24,9 @@ class Controller(Protocol):
         goal: Goal,
         dt_s: float,
         *,
-        applied: Wrench | None = None,
+        applied: BodyWrench | None = None,
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> Wrench:
+    ) -> BodyWrench:
         """The wrench for the coming span.
 
         Args:

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.state import ControlState, Goal, Vector2, Wrench, rotate
+from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, rotate
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -80,9 +80,9 @@ class Formation:
         goal: Goal,
         dt_s: float,
         *,
-        applied: Wrench | None = None,
+        applied: BodyWrench | None = None,
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> Wrench:
+    ) -> BodyWrench:
         """See `Controller.update`."""
         state = state.bounded()
         setpoint = self._setpoint(goal.bounded(), neighbours)

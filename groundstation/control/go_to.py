@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.reference import MotionLimits, PointReference
-from groundstation.control.state import ControlState, Goal, Vector2, Wrench
+from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
 from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
@@ -78,9 +78,9 @@ class GoTo:
         goal: Goal,
         dt_s: float,
         *,
-        applied: Wrench | None = None,
+        applied: BodyWrench | None = None,
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> Wrench:
+    ) -> BodyWrench:
         """See `Controller.update`; neighbours are not looked at."""
         if not (math.isfinite(dt_s) and dt_s > 0.0):
             raise ValueError(f"dt_s must be above 0, found {dt_s}")

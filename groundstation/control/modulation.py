@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from groundstation.control.allocation import Allocator
-from groundstation.control.state import Wrench
+from groundstation.control.state import BodyWrench
 
 MS_PER_S = 1000.0
 MAX_ON_MS = 127  # seven bits on the wire
@@ -53,7 +53,7 @@ class Pulses:
     """
 
     on_time_ms: tuple[int, ...]
-    delivered: Wrench
+    delivered: BodyWrench
     open_valve_s: float
 
 
@@ -79,7 +79,7 @@ class PulseModulator:
         self._carried_ms = np.zeros(3)
         self._stays_open = [False] * self._allocator.effectiveness.shape[1]
 
-    def update(self, demand: Wrench) -> Pulses:
+    def update(self, demand: BodyWrench) -> Pulses:
         """On-times for the period that starts now.
 
         Args:
@@ -87,7 +87,7 @@ class PulseModulator:
         """
         wanted_ms = np.array((*demand.force_body_n, demand.torque_nm)) * self._period_ms + self._carried_ms
         mean = (wanted_ms / self._period_ms).tolist()
-        duty = self._allocator.allocate(Wrench((mean[0], mean[1]), mean[2]), sparse=True)
+        duty = self._allocator.allocate(BodyWrench((mean[0], mean[1]), mean[2]), sparse=True)
         on_ms: list[int] = []
         open_ms: list[float] = []
         for valve, share in enumerate(duty.tolist()):
@@ -98,7 +98,7 @@ class PulseModulator:
         given_ms: NDArray[np.float64] = self._allocator.effectiveness @ open_ms
         self._carried_ms = np.clip(wanted_ms - given_ms, -self._carry_limit_ms, self._carry_limit_ms)
         given = (given_ms / self._period_ms).tolist()
-        return Pulses(tuple(on_ms), Wrench((given[0], given[1]), given[2]), sum(open_ms) / MS_PER_S)
+        return Pulses(tuple(on_ms), BodyWrench((given[0], given[1]), given[2]), sum(open_ms) / MS_PER_S)
 
     def _pulse(self, wanted_ms: float, is_open: bool) -> tuple[int, float]:
         """On-time for a wanted open time, and the open time that it really gives in this period."""

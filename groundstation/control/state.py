@@ -143,7 +143,7 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
-class Wrench:
+class BodyWrench:
     """Force through the centre of mass, body axes, and torque about the vertical."""
 
     force_body_n: Vector2
@@ -153,5 +153,5 @@ class Wrench:
         _refuse_non_finite("wrench", *self.force_body_n, self.torque_nm)
 
 
-NO_WRENCH = Wrench((0.0, 0.0), 0.0)
+NO_WRENCH = BodyWrench((0.0, 0.0), 0.0)
 """Nothing pushes."""

@@ -16,10 +16,10 @@ from groundstation.control.gains import lqr_gains
 from groundstation.control.observer import DisturbanceObserver
 from groundstation.control.state import (
     NO_WRENCH,
+    BodyWrench,
     ControlState,
     Goal,
     Vector2,
-    Wrench,
     clamp,
     limit_length,
     rotate,
@@ -99,19 +99,19 @@ class StationKeeping:
         goal: Goal,
         dt_s: float,
         *,
-        applied: Wrench | None = None,
+        applied: BodyWrench | None = None,
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> Wrench:
+    ) -> BodyWrench:
         """See `Controller.update`; neighbours are not looked at."""
         if not (math.isfinite(dt_s) and dt_s > 0.0):
             raise ValueError(f"dt_s must be above 0, found {dt_s}")
         state, goal = state.bounded(), goal.bounded()
         self._observe(state, self._last if applied is None else applied, min(dt_s, LONGEST_SPAN_S))
         force = rotate(self._force_table_n(state, goal), -state.heading_rad)
-        self._last = self._envelope.saturate(Wrench(force, self._torque_nm(state, goal)))
+        self._last = self._envelope.saturate(BodyWrench(force, self._torque_nm(state, goal)))
         return self._last
 
-    def _observe(self, state: ControlState, applied: Wrench, dt_s: float) -> None:
+    def _observe(self, state: ControlState, applied: BodyWrench, dt_s: float) -> None:
         mass_kg = self._vehicle.mass_kg
         acted = self._envelope.saturate(applied)
         push, slope = rotate(acted.force_body_n, state.heading_rad), state.slope_table_m_s2

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from groundstation.control.state import NO_WRENCH, Wrench
+from groundstation.control.state import NO_WRENCH, BodyWrench
 from groundstation.control.vehicle import VehicleModel
 
 KEPT_NS = 1_000_000_000
@@ -41,7 +41,7 @@ class ValvePush:
         while self._pulses and self._pulses[0][1][1] < now_ns - KEPT_NS:
             self._pulses.popleft()
 
-    def mean(self, start_ns: int, stop_ns: int) -> Wrench:
+    def mean(self, start_ns: int, stop_ns: int) -> BodyWrench:
         """Mean wrench on the body over a span, as commanded.
 
         Raises:
@@ -58,7 +58,7 @@ class ValvePush:
                 share = overlap / (stop_ns - start_ns)
                 x, y, turn = self._columns[valve]
                 fx, fy, torque = fx + share * x, fy + share * y, torque + share * turn
-        return Wrench((fx, fy), torque)
+        return BodyWrench((fx, fy), torque)
 
     def _is_open(self, valve: int, now_ns: int) -> bool:
         return any(each == valve and begin <= now_ns < end for each, (begin, end) in self._pulses)

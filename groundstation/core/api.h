@@ -41,7 +41,7 @@ typedef struct {
 /* One spot; Python reads it as nine doubles. */
 typedef struct {
     double u_px, v_px, flux_dn;
-    Symmetric cov_px2;
+    Symmetric covariance_px2;
     double elongation;
     double streak_u_px, streak_v_px;
 } FittedSpot;
@@ -113,16 +113,16 @@ typedef struct {
 typedef struct {
     int64_t spots;
     const double *u_px, *v_px;
-    const double *cov_px2;   /* (spots, 3): uu, uv, vv */
+    const double *covariance_px2;   /* (spots, 3): uu, uv, vv */
     const double *streak_px; /* (spots, 2) */
     int64_t has_prior;
-    double prior_x_m, prior_y_m, prior_heading_rad, prior_cov[9];
+    double prior_x_m, prior_y_m, prior_heading_rad, prior_covariance[9];
     int64_t has_motion;
-    double vx_table_m_s, vy_table_m_s, omega_rad_s;
+    double vx_table_m_s, vy_table_m_s, rate_rad_s;
     double *doubles;   /* scratch, gs_star_doubles() */
     int32_t *integers; /* scratch, gs_star_integers(), zero at first */
     int64_t is_fix, is_tracked, is_ambiguous, stars;
-    double x_m, y_m, heading_rad, cov[9], evidence_nats;
+    double x_m, y_m, heading_rad, covariance[9], evidence_nats;
     double best_nats, guess[3];       /* of a refused picture */
     int32_t *spot_index, *star_index; /* (stars,), room for every spot */
     Point *residual_m;
@@ -154,25 +154,25 @@ enum {
 
 /* A row of the history; see packet_history.py. */
 typedef struct {
-    double end_s, span_s, omega, ax, ay, warmth, is_hole;
+    double end_s, span_s, rate, ax, ay, warmth, is_hole;
 } Packet;
 
 typedef struct {
-    double omega, ax, ay;
+    double rate, ax, ay;
 } Readings;
 
 /* estimator.ImuPacket, field by field. */
 typedef struct {
     int64_t t_ns;
-    double dt_s, omega_rad_s, ax_m_s2, ay_m_s2, temperature_c;
+    double dt_s, rate_rad_s, ax_m_s2, ay_m_s2, temperature_c;
 } ImuPacket;
 
 /* estimator.PlanarState, field by field: of the centre of mass. */
 typedef struct {
     int64_t t_ns;
-    double x_m, y_m, heading_rad, vx_m_s, vy_m_s, omega_rad_s;
-    double bias_omega_rad_s, bias_ax_m_s2, bias_ay_m_s2;
-    double std_x_m, std_y_m, std_heading_rad;
+    double x_m, y_m, heading_rad, vx_m_s, vy_m_s, rate_rad_s;
+    double bias_rate_rad_s, bias_ax_m_s2, bias_ay_m_s2;
+    double sigma_x_m, sigma_y_m, sigma_heading_rad;
     _Bool is_lost;
 } PlanarState;
 
@@ -208,7 +208,7 @@ typedef struct {
 
     /* now */
     double theta, vx, vy, px, py;
-    double omega, force_x, force_y;
+    double rate, force_x, force_y;
     double warmth, temperature_c, reference_c;
     double bg, bax, bay; /* at the present temperature */
     Readings good;       /* the newest that were integrated */

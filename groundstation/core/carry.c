@@ -49,7 +49,7 @@ static Force force_of(const double *x, const Packet *p) {
 }
 
 static double rate_of(const double *x, const Packet *p) {
-    return (p->omega - x[GYRO_BIAS] - x[GYRO_TEMPCO] * p->warmth) * (1.0 - x[GYRO_SCALE]);
+    return (p->rate - x[GYRO_BIAS] - x[GYRO_TEMPCO] * p->warmth) * (1.0 - x[GYRO_SCALE]);
 }
 
 /* slope_grid.py, along: bilinear; the mean outside. */
@@ -198,7 +198,7 @@ static void add_hole(Stretch *s, int64_t hole, double left, double *vv, double *
         for (int64_t i = from; i <= to; i++) {
             const Packet *p = &s->history[i];
             const Force f = force_of(s->x, p);
-            const double value[3] = {f.fx, f.fy, p->omega};
+            const double value[3] = {f.fx, f.fy, p->rate};
             for (int k = 0; k < 3; k++) {
                 if (pass == 0) mean[k] += value[k] / n;
                 else spread[k] += (value[k] - mean[k]) * (value[k] - mean[k]) / n;

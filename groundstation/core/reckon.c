@@ -8,11 +8,11 @@
 static int within(double limit, double value) { return -limit <= value && value <= limit; }
 
 static int is_beyond_scale(const Reckoner *r, Readings at) {
-    return !(within(r->full_rate, at.omega) && within(r->full_force, at.ax) && within(r->full_force, at.ay));
+    return !(within(r->full_rate, at.rate) && within(r->full_force, at.ax) && within(r->full_force, at.ay));
 }
 
 static int is_near(const Reckoner *r, Readings at, Readings other) {
-    return within(r->max_rate_step, at.omega - other.omega) && within(r->max_force_step, at.ax - other.ax) &&
+    return within(r->max_rate_step, at.rate - other.rate) && within(r->max_force_step, at.ax - other.ax) &&
            within(r->max_force_step, at.ay - other.ay);
 }
 
@@ -48,9 +48,9 @@ void gs_reckoner_warm(Reckoner *r) {
 
 /* Write one stretch of constant readings into `row` and integrate it. */
 static void advance(Reckoner *r, Packet *row, double t, double dt, Readings read, double hole) {
-    *row = (Packet){t, dt, read.omega, read.ax, read.ay, r->warmth, hole};
+    *row = (Packet){t, dt, read.rate, read.ax, read.ay, r->warmth, hole};
     if ((r->rest_from_s <= t && t <= r->rest_to_s) || !r->has_pose) return;
-    const double w = (read.omega - r->bg) * r->gyro_gain;
+    const double w = (read.rate - r->bg) * r->gyro_gain;
     const double ux = read.ax - r->bax, uy = read.ay - r->bay;
     const double fx = r->mxx * ux - r->mxy * uy;
     const double fy = r->myy * uy - r->myx * ux;
@@ -67,12 +67,12 @@ static void advance(Reckoner *r, Packet *row, double t, double dt, Readings read
     r->vx = vx + ax * dt;
     r->vy = vy + ay * dt;
     r->theta += turn;
-    r->omega = w;
+    r->rate = w;
 }
 
 void gs_reckoner_report(Reckoner *r) {
     const double off = (double)(r->newest_ns - r->origin_ns) * 1e-9 - r->newest_s;
-    const double w = r->omega, lag = r->acc_lag_s + off, vx = r->vx, vy = r->vy, gx = r->gx, gy = r->gy;
+    const double w = r->rate, lag = r->acc_lag_s + off, vx = r->vx, vy = r->vy, gx = r->gx, gy = r->gy;
     const double theta = r->theta + (r->gyro_lag_s + off) * w;
     const double c = cos(theta), s = sin(theta);
     const double lever_x = c * r->lever_x - s * r->lever_y;
@@ -86,13 +86,13 @@ void gs_reckoner_report(Reckoner *r) {
     state->heading_rad = theta;
     state->vx_m_s = vx + lag * r->force_x + w * lever_y;
     state->vy_m_s = vy + lag * r->force_y - w * lever_x;
-    state->omega_rad_s = w;
-    state->bias_omega_rad_s = r->bg;
+    state->rate_rad_s = w;
+    state->bias_rate_rad_s = r->bg;
     state->bias_ax_m_s2 = r->bax - c * gx - s * gy;
     state->bias_ay_m_s2 = r->bay + s * gx - c * gy;
-    state->std_x_m = sqrt(x[0] + tau * (x[1] + tau * (x[2] + tau * (x[3] + tau * x[4]))));
-    state->std_y_m = sqrt(y[0] + tau * (y[1] + tau * (y[2] + tau * (y[3] + tau * y[4]))));
-    state->std_heading_rad = sqrt(h[0] + tau * (h[1] + tau * h[2]));
+    state->sigma_x_m = sqrt(x[0] + tau * (x[1] + tau * (x[2] + tau * (x[3] + tau * x[4]))));
+    state->sigma_y_m = sqrt(y[0] + tau * (y[1] + tau * (y[2] + tau * (y[3] + tau * y[4]))));
+    state->sigma_heading_rad = sqrt(h[0] + tau * (h[1] + tau * h[2]));
 }
 
 int gs_reckoner_add(Reckoner *r) {
@@ -126,7 +126,7 @@ int gs_reckoner_add(Reckoner *r) {
         r->warmth = temperature_c - r->reference_c;
         gs_reckoner_warm(r);
     }
-    Readings read = {asked.omega_rad_s, asked.ax_m_s2, asked.ay_m_s2};
+    Readings read = {asked.rate_rad_s, asked.ax_m_s2, asked.ay_m_s2};
     double hole = 0.0;
     if (is_wild(r, read)) {
         flags |= WILD;
@@ -137,7 +137,7 @@ int gs_reckoner_add(Reckoner *r) {
         flags |= HOLE;
         const double gap = dt - period;
         dt = period;
-        const Readings between = {0.5 * (read.omega + r->good.omega), 0.5 * (read.ax + r->good.ax),
+        const Readings between = {0.5 * (read.rate + r->good.rate), 0.5 * (read.ax + r->good.ax),
                                   0.5 * (read.ay + r->good.ay)};
         advance(r, &r->hole_row, t - dt, gap, between, 1.0);
     }

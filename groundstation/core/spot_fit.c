@@ -72,20 +72,20 @@ static void take_moments(const SpotPixels *p, double gain, Spot *s)
     s->flux_dn = larger(sum, 1e-9);
     s->u_px = sum_u / s->flux_dn;
     s->v_px = sum_v / s->flux_dn;
-    Symmetric spread = {0}, cov = {0};
+    Symmetric spread = {0}, covariance = {0};
     for (int32_t i = 0; i < s->size; i++) {
         const double du = u[i] - s->u_px, dv = v[i] - s->v_px;
         const double variance = floor[i] + gain * larger(light[i], 0.0);
         spread.uu += light[i] * (du * du);
         spread.uv += light[i] * (du * dv);
         spread.vv += light[i] * (dv * dv);
-        cov.uu += variance * (du * du);
-        cov.uv += variance * (du * dv);
-        cov.vv += variance * (dv * dv);
+        covariance.uu += variance * (du * du);
+        covariance.uv += variance * (du * dv);
+        covariance.vv += variance * (dv * dv);
     }
     const double f = s->flux_dn, f2 = f * f;
     s->spread_px2 = (Symmetric){spread.uu / f, spread.uv / f, spread.vv / f};
-    s->cov_px2 = (Symmetric){cov.uu / f2, cov.uv / f2, cov.vv / f2};
+    s->covariance_px2 = (Symmetric){covariance.uu / f2, covariance.uv / f2, covariance.vv / f2};
 }
 
 /* The value in the middle of sorted ones (the upper of two); `value` is reordered. */
@@ -275,7 +275,7 @@ static void sum_normal(const SpotPixels *p, const Spot *s, double gain, const Im
 }
 
 /* One Gauss-Newton step: the light eliminated, the 2x2 system of the centre solved. 0 where it cannot be trusted. */
-static int step(const Normal *n, double at[3], Symmetric *cov)
+static int step(const Normal *n, double at[3], Symmetric *covariance)
 {
     const double ff = larger(n->ff, 1e-300);
     const double uu = n->uu - n->uf * n->uf / ff, uv = n->uv - n->uf * n->vf / ff, vv = n->vv - n->vf * n->vf / ff;
@@ -287,7 +287,7 @@ static int step(const Normal *n, double at[3], Symmetric *cov)
     at[0] += du;
     at[1] += dv;
     at[2] += (n->gf - n->uf * du - n->vf * dv) / ff;
-    *cov = (Symmetric){vv / determinant, -uv / determinant, uu / determinant};
+    *covariance = (Symmetric){vv / determinant, -uv / determinant, uu / determinant};
     return 1;
 }
 
@@ -296,18 +296,18 @@ static void fit_spot(const SpotPixels *p, double gain, const Spot *s, FittedSpot
     describe_shape(s->shape_px2, f);
     const Image image = image_of(s->shape_px2, f);
     double at[3] = {s->u_px, s->v_px, s->flux_dn};
-    Symmetric cov = s->cov_px2;
+    Symmetric covariance = s->covariance_px2;
     int trusted = s->size <= MAX_FIT_PX;
     for (int k = 0; k < STEPS && trusted; k++) {
         Normal normal;
         sum_normal(p, s, gain, &image, at, k == STEPS - 1, &normal);
-        trusted = step(&normal, at, &cov);
+        trusted = step(&normal, at, &covariance);
     }
     trusted = trusted && at[2] > 0.0;
     f->u_px = trusted ? at[0] : s->u_px;
     f->v_px = trusted ? at[1] : s->v_px;
     f->flux_dn = trusted ? at[2] : s->flux_dn;
-    f->cov_px2 = trusted ? cov : s->cov_px2;
+    f->covariance_px2 = trusted ? covariance : s->covariance_px2;
 }
 
 void fit_spots(const SpotPixels *p, double gain, Spot *spots, int32_t count, double *work, FittedSpot *fitted)

@@ -15,7 +15,7 @@ typedef struct {
 typedef struct {
     int32_t first, size; /* its pixels */
     double u_px, v_px, flux_dn;
-    Symmetric spread_px2, cov_px2; /* second moments; covariance of the centre */
+    Symmetric spread_px2, covariance_px2; /* second moments; covariance of the centre */
     Symmetric shape_px2;           /* of the Gaussian that is fitted */
 } Spot;
 

@@ -119,14 +119,14 @@ void to_middle(const StarPicture *picture, const SearchSettings *settings, doubl
     const Point velocity = turned_back(turn, (Point){picture->vx_table_m_s, picture->vy_table_m_s});
     if (settings->exposure_s > 0.0) {
         const double exposure_s = settings->exposure_s;
-        unbend(n, q, (Smear){picture->omega_rad_s * exposure_s, scaled(velocity, exposure_s)}, out);
+        unbend(n, q, (Smear){picture->rate_rad_s * exposure_s, scaled(velocity, exposure_s)}, out);
     } else {
         memcpy(out, q, (size_t)n * sizeof *out);
     }
     if (settings->readout_s > 0.0) {
         for (int64_t i = 0; i < n; i++) {
             const double delay_s = (picture->v_px[i] / (picture_rows - 1.0) - 0.5) * settings->readout_s;
-            out[i] = add(turned(unit_at(picture->omega_rad_s * delay_s), out[i]), scaled(velocity, delay_s));
+            out[i] = add(turned(unit_at(picture->rate_rad_s * delay_s), out[i]), scaled(velocity, delay_s));
         }
     }
 }

@@ -159,7 +159,7 @@ int refine_pose(const SearchSettings *settings, int64_t n, const Point *q, const
                              c * xh - s * yh,
                              s * xh + c * yh,
                              hh};
-    memcpy(pose->cov, table, sizeof table);
+    memcpy(pose->covariance, table, sizeof table);
     pose->turn = turn;
     pose->shift_m = shift_m;
     pose->kept = 0;

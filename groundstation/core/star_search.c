@@ -41,8 +41,8 @@ static int track(SkySearch *s)
     const StarPicture *p = s->picture;
     Candidate prior = {unit_at(p->prior_heading_rad), {p->prior_x_m, p->prior_y_m}, 0};
     double nats;
-    const double sideways = sqrt(fmax(p->prior_cov[0], p->prior_cov[4]));
-    const double turning = 0.5 * s->rays->reach_m * sqrt(p->prior_cov[8]);
+    const double sideways = sqrt(fmax(p->prior_covariance[0], p->prior_covariance[4]));
+    const double turning = 0.5 * s->rays->reach_m * sqrt(p->prior_covariance[8]);
     const double sigma = sqrt(sideways * sideways + turning * turning);
     const double gate_m = fmin(3.0 * sigma + 2.0 * s->sky->tolerance_m, 0.1);
     return settle(s, &prior, gate_m, 1, &nats);

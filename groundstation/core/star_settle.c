@@ -55,7 +55,7 @@ static void weigh(SkySearch *s, int64_t n)
     const double ratio2 = s->settings->streak_floor_ratio * s->settings->streak_floor_ratio;
     for (int64_t i = 0; i < n; i++) {
         const int64_t spot = s->spot[i];
-        const double *j = s->jacobian + 4 * spot, *c = s->picture->cov_px2 + 3 * spot;
+        const double *j = s->jacobian + 4 * spot, *c = s->picture->covariance_px2 + 3 * spot;
         const double *streak = s->picture->streak_px + 2 * spot;
         const double more = floor2 + ratio2 * (streak[0] * streak[0] + streak[1] * streak[1]);
         const double uu = c[0] + more, uv = c[1], vv = c[2] + more;
@@ -82,7 +82,7 @@ static double volume_of(const SkySearch *s, const Pose *pose, int has_prior)
     const double off[3] = {pose->shift_m.x - p->prior_x_m, pose->shift_m.y - p->prior_y_m, atan2(by.y, by.x)};
     double spread[9], x[3], determinant;
     for (int k = 0; k < 9; k++) {
-        spread[k] = p->prior_cov[k] + pose->cov[k];
+        spread[k] = p->prior_covariance[k] + pose->covariance[k];
     }
     if (!solve_3x3(spread, off, 1, x, &determinant)) {
         return NAN;
@@ -121,7 +121,7 @@ static void answer(SkySearch *s, int64_t n, const Pose *pose, double nats, int h
     p->y_m = pose->shift_m.y;
     p->heading_rad = atan2(pose->turn.y, pose->turn.x);
     p->evidence_nats = nats;
-    memcpy(p->cov, pose->cov, sizeof p->cov);
+    memcpy(p->covariance, pose->covariance, sizeof p->covariance);
     p->stars = 0;
     for (int64_t i = 0; i < n; i++) {
         if (s->kept[i] > 0.5) {

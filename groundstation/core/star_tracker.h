@@ -7,7 +7,7 @@
 
 typedef struct {
     Point turn, shift_m;
-    double cov[9];
+    double covariance[9];
     int64_t kept;
 } Pose;
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
+from groundstation.files.number_tables import load_table
 from groundstation.files.reading import read_bytes
-from groundstation.files.tables import load_table
 from groundstation.files.values import number, numbers
 from groundstation.fusion.flight_data import FlightData
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth, packet_density

@@ -34,7 +34,7 @@ class Between(NamedTuple):
 
 def fixes_agree(first: Fix, second: Fix, between: Between) -> bool:
     """Return whether one vehicle may have been seen at both poses."""
-    slack = SIGMAS * np.sqrt(np.diag(first.cov) + np.diag(second.cov))
+    slack = SIGMAS * np.sqrt(np.diag(first.covariance) + np.diag(second.covariance))
     slack[:2] += MAX_SPEED_M_S * between.flown_s
     slack[2] += NULL_SIGMAS * between.null_sigma_rad_s * between.flown_s
     off = [

@@ -136,9 +136,9 @@ class Course:
     def correct(self, at: Checkpoint, fix: Fix) -> Fixed:
         """Return the checkpoint at a fix's exposure corrected by it; the same if it lies outside the gate."""
         x, P, noise = at.x.copy(), at.P.copy(), self._noise
-        omega_read = self.history.omega_at(at.t_s)
-        z, H = measurements.predict_fix(fix, x, omega_read, noise)
-        R = measurements.fix_covariance(fix, x, omega_read - x[es.GYRO_BIAS], noise)
+        rate_read = self.history.rate_at(at.t_s)
+        z, H = measurements.predict_fix(fix, x, rate_read, noise)
+        R = measurements.fix_covariance(fix, x, rate_read - x[es.GYRO_BIAS], noise)
         correction = self._late_fix.correct(x, P, z, H, R, noise.gate_nis)
         return Fixed(replace(at, x=x, P=P), z, H, correction)
 
@@ -165,16 +165,16 @@ class Course:
             x[here] = self._late_fix.slope(at.surface, x, _ahead(x, 0.5 * look_s))
         return x
 
-    def variance_in_time(self, at: Checkpoint, omega_rad_s: float) -> list[float]:
+    def variance_in_time(self, at: Checkpoint, rate_rad_s: float) -> list[float]:
         """Return the variances (13) of the report as polynomials in the time since a checkpoint.
 
         Args:
             at: where they hold.
-            omega_rad_s: the rate since then.
+            rate_rad_s: the rate since then.
         """
         noise = self._noise_in_doubt if self.doubt.is_open else self._noise
         variance = self._late_fix.variance_in_time(at.x, at.P, noise)
-        measurements.add_scale_in_time(variance, at.P, omega_rad_s)
+        measurements.add_scale_in_time(variance, at.P, rate_rad_s)
         return variance
 
     def forget_before(self, t_s: float, *, keep_packets: bool) -> None:

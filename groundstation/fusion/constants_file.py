@@ -50,9 +50,9 @@ def surest(files: Iterable[Constants]) -> Constants:
     """Return the constants of several files; of one that several hold, the surest counts."""
     found: Constants = {}
     for constants in files:
-        for name, (value, std) in constants.items():
-            if name not in found or std < found[name][1]:
-                found[name] = (value, std)
+        for name, (value, sigma) in constants.items():
+            if name not in found or sigma < found[name][1]:
+                found[name] = (value, sigma)
     return found
 
 
@@ -68,16 +68,16 @@ def parse_constants(data: bytes, path: Path) -> Constants:
         name = ALIASES.get(key, key)
         if name not in UNITS or not isinstance(table, dict):
             continue
-        value, std = _number(path, key, table, "value"), _number(path, key, table, "std")
-        if math.isnan(value) or math.isnan(std):
+        value, sigma = _number(path, key, table, "value"), _number(path, key, table, "std")
+        if math.isnan(value) or math.isnan(sigma):
             continue  # the calibration could not determine it
-        if not (math.isfinite(value) and math.isfinite(std) and std > 0.0):
+        if not (math.isfinite(value) and math.isfinite(sigma) and sigma > 0.0):
             raise FileError(f"{path}: {key} must be finite with a std above zero.")
         if table.get("unit") != UNITS[name]:
             raise FileError(
                 f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r}."
             )
-        found[name] = (value, std)
+        found[name] = (value, sigma)
     if not found:
         raise FileError(
             f"{path} holds no constant that lasts: give it the result of `calibrate joint`, `imu`, `tilt`, "

@@ -12,7 +12,7 @@ import math
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
 from groundstation.fusion.checkpoint import Course
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.fix_judge import FixJudge
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
@@ -104,13 +104,13 @@ class ErrorStateFilter:
             self._integrate_to_now()
         return reckoner.report() if reckoner.has_pose else None
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix at its arrival and give account of it."""
         account = self._judge.add(fix)
         self._follow()
         return account
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets."""
         return self._judge.settled()
 
@@ -119,14 +119,14 @@ class ErrorStateFilter:
         return self._reckoner.report() if self._reckoner.has_pose else None
 
     def covariance(self) -> Array:
-        """Return (6, 6) of x, y, heading, vx, vy, omega of the centre of mass now."""
+        """Return (6, 6) of x, y, heading, vx, vy, rate of the centre of mass now."""
         now = self._course.carry(self._judge.checkpoint, self._reckoner.newest_s)
-        H = measurements.reported(now.x, self._reckoner.omega_rad_s)
+        H = measurements.reported(now.x, self._reckoner.rate_rad_s)
         C: Array = H @ now.P[: es.SIZE, : es.SIZE] @ H.T
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
         return C
 
-    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+    def expected_forces(self, rate_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
         """Return what the accelerometers would read under a known push of the centre of mass, body axes."""
         x = self.x
         bias_x, bias_y = float(x[es.ACC_BIAS_X]), float(x[es.ACC_BIAS_Y])
@@ -138,7 +138,7 @@ class ErrorStateFilter:
                 gx, gy = gx + known[0], gy + known[1]
             c, s = math.cos(state.heading_rad), math.sin(state.heading_rad)
             bias_x, bias_y = state.bias_ax_m_s2 + c * gx + s * gy, state.bias_ay_m_s2 + c * gy - s * gx
-        w = omega_rad_s - (x[es.GYRO_BIAS] if state is None else state.bias_omega_rad_s)
+        w = rate_rad_s - (x[es.GYRO_BIAS] if state is None else state.bias_rate_rad_s)
         rx, ry = float(x[es.LEVER_X]), float(x[es.LEVER_Y])
         return (
             bias_x + push_m_s2[0] - turn_rad_s2 * ry - w * w * rx,
@@ -174,4 +174,4 @@ class ErrorStateFilter:
         x = self._course.state_at(at, reckoner.newest_s, 1e-9 * LOOK_NS)
         self._look_due_ns = reckoner.newest_ns + LOOK_NS
         reckoner.load(x[: es.SIZE], x[: es.MOVING])
-        reckoner.trust(at.t_s, self._course.variance_in_time(at, reckoner.omega_rad_s))
+        reckoner.trust(at.t_s, self._course.variance_in_time(at, reckoner.rate_rad_s))

@@ -28,7 +28,7 @@ class ImuPacket(NamedTuple):
     """End of the window."""
     dt_s: float
     """Since the end of the last packet, by the sensor's ticks; over one window where packets were lost."""
-    omega_rad_s: float
+    rate_rad_s: float
     ax_m_s2: float
     ay_m_s2: float
     temperature_c: float
@@ -44,7 +44,7 @@ class Fix(NamedTuple):
     x_m: float
     y_m: float
     heading_rad: float
-    cov: Array
+    covariance: Array
     """(3, 3) of x, y, heading; m^2, m rad, rad^2."""
     source: str = "stars"
     """Who made it; the exposures of one source never go back."""
@@ -60,19 +60,19 @@ class PlanarState(NamedTuple):
     """Not wrapped: continuous over turns."""
     vx_m_s: float
     vy_m_s: float
-    omega_rad_s: float
-    bias_omega_rad_s: float
+    rate_rad_s: float
+    bias_rate_rad_s: float
     bias_ax_m_s2: float
     """To be taken from the accelerometer: its bias minus the slope's gravity in body axes."""
     bias_ay_m_s2: float
-    std_x_m: float
-    std_y_m: float
-    std_heading_rad: float
+    sigma_x_m: float
+    sigma_y_m: float
+    sigma_heading_rad: float
     is_lost: bool
     """True until two fixes agree, and again when fixes in a row contradict the estimate."""
 
 
-class FixAccount(NamedTuple):
+class FixOutcome(NamedTuple):
     """What became of one fix."""
 
     t_exposure_ns: int
@@ -114,26 +114,26 @@ class Estimator(Protocol):
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Take one packet; None as long as no fix has given a pose, or when the packet was refused."""
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix, at its arrival."""
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets, once each."""
 
     def state(self) -> PlanarState | None:
         """Return the state after the newest packet."""
 
     def covariance(self) -> Array:
-        """Return (6, 6) of x, y, heading, vx, vy, omega at the newest packet, centre of mass."""
+        """Return (6, 6) of x, y, heading, vx, vy, rate at the newest packet, centre of mass."""
 
     def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
         """Say which accelerometers are not believed from this stamp on; readings are made up meanwhile."""
 
-    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+    def expected_forces(self, rate_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
         """Return what the accelerometers would read under a known push.
 
         Args:
-            omega_rad_s: the gyro's reading.
+            rate_rad_s: the gyro's reading.
             push_m_s2: acceleration of the centre of mass by the valves, body axes.
             turn_rad_s2: angular acceleration by the valves.
         """

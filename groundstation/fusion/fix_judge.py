@@ -17,7 +17,7 @@ from groundstation.fusion import error_state as es
 from groundstation.fusion.agreement import Between, fixes_agree, innovations_agree
 from groundstation.fusion.checkpoint import Checkpoint, Course
 from groundstation.fusion.creep_watch import CreepWatch
-from groundstation.fusion.estimator import WAITS, Array, Counters, Fix, FixAccount
+from groundstation.fusion.estimator import WAITS, Array, Counters, Fix, FixOutcome
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S, FirstFixes
 from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.measurements import REST_VELOCITY_M_S
@@ -60,9 +60,9 @@ class FixJudge:
         self._refused: list[tuple[float, Array]] = []
         self._creep = CreepWatch()
         self.waiting: list[Fix] = []
-        self._accounts: list[FixAccount] = []
+        self._accounts: list[FixOutcome] = []
 
-    def add(self, fix: Fix) -> FixAccount:
+    def add(self, fix: Fix) -> FixOutcome:
         """Take a fix at its arrival and give account of it."""
         account = self._judge(fix)
         if account.reason == WAITS:
@@ -79,7 +79,7 @@ class FixJudge:
             else:
                 self._accounts.append(account)
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait."""
         accounts, self._accounts = self._accounts, []
         return accounts
@@ -89,7 +89,7 @@ class FixJudge:
         if self._trace is not None and self._trace.chains:
             self._course.carry(self.checkpoint, self._reckoner.newest_s, self._trace.chains[-1].steps)
 
-    def _judge(self, fix: Fix) -> FixAccount:
+    def _judge(self, fix: Fix) -> FixOutcome:
         complaint = complaint_about(fix)
         if complaint is not None:
             return self._refuse(fix, complaint)
@@ -108,11 +108,11 @@ class FixJudge:
             return self._insert(fix, t)
         return self._correct(fix, t)
 
-    def _refuse(self, fix: Fix, reason: str) -> FixAccount:
+    def _refuse(self, fix: Fix, reason: str) -> FixOutcome:
         self._counters.add("fix_" + reason.replace(" ", "_"))
         return _account(fix, reason)
 
-    def _correct(self, fix: Fix, t: float, *, is_late: bool = False) -> FixAccount:
+    def _correct(self, fix: Fix, t: float, *, is_late: bool = False) -> FixOutcome:
         """Carry the checkpoint to the exposure and correct there, unless the fix lies outside the gate."""
         steps: list[Step] | None = None if self._trace is None else []
         fixed = self._course.correct(self._course.carry(self.checkpoint, t, steps), fix)
@@ -131,7 +131,7 @@ class FixJudge:
         self._accept(fix, fixed.checkpoint, is_late=is_late)
         return _account(fix, "used", z, nis, used=True)
 
-    def _insert(self, fix: Fix, t: float) -> FixAccount:
+    def _insert(self, fix: Fix, t: float) -> FixOutcome:
         """Take a fix whose exposure lies before some that were used: go back, take it, take those again."""
         split = self._past.before_and_after(fix, t)
         if split is None or self._trace is not None or self._reckoner.is_lost:
@@ -153,7 +153,7 @@ class FixJudge:
         self.checkpoint = last.checkpoint
         self._creep = copy.copy(last.creep)
 
-    def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
+    def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixOutcome:
         """Refuse a fix, or believe it when those before it said the same."""
         self._counters.add("fix_outside_the_gate")
         self._refused.append((t, z))
@@ -163,7 +163,7 @@ class FixJudge:
                 return self._restart(fix, t, z, nis)
         return _account(fix, "outside the gate", z, nis)
 
-    def _consider(self, fix: Fix) -> FixAccount:
+    def _consider(self, fix: Fix) -> FixOutcome:
         """Start from the first two fixes that agree; one alone may be wrong."""
         first, settled = self._first_fixes.consider(fix, self._agree)
         self._accounts += [_account(old, reason, used=old is first) for old, reason in settled]
@@ -181,7 +181,7 @@ class FixJudge:
         if rests.at(a) is not None and rests.at(b) is not None:
             return fixes_agree(first, second, Between(0.0, 0.0, 0.0))
         segment = self._course.history.between(a, b)
-        turned = float(((segment.omega_rad_s - at.x[es.GYRO_BIAS]) * segment.span_s).sum())
+        turned = float(((segment.rate_rad_s - at.x[es.GYRO_BIAS]) * segment.span_s).sum())
         null_sigma = math.sqrt(at.P[es.GYRO_BIAS, es.GYRO_BIAS])
         return fixes_agree(first, second, Between(b - a, turned, null_sigma))
 
@@ -198,7 +198,7 @@ class FixJudge:
         self._accept(fix, begun)
         self._counters.add("fix_starts_the_estimate")
 
-    def _restart(self, fix: Fix, t: float, z: Array, nis: float) -> FixAccount:
+    def _restart(self, fix: Fix, t: float, z: Array, nis: float) -> FixOutcome:
         """Take the pose from this fix; what made the filter wrong may sit in the biases, so they open too."""
         P = np.diag(np.minimum(es.initial_variance(self._noise), es.reopened_variance()))
         doubted = replace(self.checkpoint, x=self.checkpoint.x[: es.SIZE], P=P)
@@ -227,6 +227,6 @@ class FixJudge:
 
 def _account(
     fix: Fix, reason: str, z: Array | None = None, nis: float = math.nan, *, used: bool = False
-) -> FixAccount:
+) -> FixOutcome:
     x, y, heading = (math.nan,) * 3 if z is None else map(float, z)
-    return FixAccount(fix.t_exposure_ns, used, reason, x, y, heading, nis, fix.source)
+    return FixOutcome(fix.t_exposure_ns, used, reason, x, y, heading, nis, fix.source)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.fusion.estimator import Estimator, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.stamp_ticks import StampTicks
 
@@ -24,7 +24,7 @@ class FlightData:
     """Packets, fixes and what is known of them; seconds of one clock.
 
     Attributes:
-        imu: (n, 5) stamp s, omega, ax, ay, temperature, in the order of arrival.
+        imu: (n, 5) stamp s, rate, ax, ay, temperature, in the order of arrival.
         stars: (m, 5) exposure s, arrival s, x, y, heading, in the order of arrival.
         covariance: (m, 3, 3) of each fix.
         run_start_s: Until then the vehicle stands still.
@@ -55,7 +55,7 @@ class FlightData:
 
 def estimate(
     data: FlightData, estimator: Estimator, progress: Callable[[float], None] | None = None
-) -> tuple[list[PlanarState | None], list[FixAccount]]:
+) -> tuple[list[PlanarState | None], list[FixOutcome]]:
     """Feed a flight to an estimator in the order in which it arrived.
 
     Args:
@@ -68,13 +68,13 @@ def estimate(
     """
     ticks = StampTicks(data.noise.packet_period_s)
     stars, next_fix = data.stars.tolist(), 0
-    accounts: list[FixAccount] = []
+    accounts: list[FixOutcome] = []
     states: list[PlanarState | None] = []
     resting = data.run_start_s > 0.0
     if resting:
         estimator.begin_rest(0)
     rows = data.imu.tolist()
-    for number, (t, omega, ax, ay, temperature) in enumerate(rows):
+    for number, (t, rate, ax, ay, temperature) in enumerate(rows):
         while next_fix < len(stars) and stars[next_fix][1] <= t:
             accounts.append(_add_fix(estimator, stars[next_fix], data.covariance[next_fix]))
             next_fix += 1
@@ -85,7 +85,7 @@ def estimate(
             estimator.counters.add("packet_stamp_not_finite")
             states.append(None)
             continue
-        packet = ImuPacket(round(t * NS), ticks.elapsed_s(t), omega, ax, ay, temperature)
+        packet = ImuPacket(round(t * NS), ticks.elapsed_s(t), rate, ax, ay, temperature)
         states.append(estimator.add_imu(packet))
         if progress is not None and number % PROGRESS_PACKETS == PROGRESS_PACKETS - 1:
             progress(number / len(rows))
@@ -95,20 +95,20 @@ def estimate(
     return states, _merge(accounts, estimator.settled())
 
 
-def _add_fix(estimator: Estimator, row: list[float], cov: Array) -> FixAccount:
+def _add_fix(estimator: Estimator, row: list[float], covariance: Array) -> FixOutcome:
     exposure, arrival, x, y, heading = row
     if exposure - exposure != 0.0:
         estimator.counters.add("fix_stamp_not_finite")
         return _refused([0.0, *row[1:]], "not finite")
-    return estimator.add_fix(Fix(round(exposure * NS), round(arrival * NS), x, y, heading, cov))
+    return estimator.add_fix(Fix(round(exposure * NS), round(arrival * NS), x, y, heading, covariance))
 
 
-def _refused(row: list[float], reason: str) -> FixAccount:
+def _refused(row: list[float], reason: str) -> FixOutcome:
     stamp = round(row[0] * NS) if math.isfinite(row[0]) else 0
-    return FixAccount(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
+    return FixOutcome(stamp, False, reason, math.nan, math.nan, math.nan, math.nan)
 
 
-def _merge(accounts: list[FixAccount], settled: list[FixAccount]) -> list[FixAccount]:
+def _merge(accounts: list[FixOutcome], settled: list[FixOutcome]) -> list[FixOutcome]:
     """Replace the account of a fix that waited by the one given when it was settled."""
     later = {account.t_exposure_ns: account for account in settled}
     return [

@@ -3,7 +3,7 @@
 Height over the table is taken as a Gaussian process with the covariance exp(-d^2 / 2 l^2). What pulls a
 gliding vehicle is its gradient, whose covariance between places (dx, dy) = d apart is
 
-    cov(g_i, g_j) = sigma^2 (delta_ij - d_i d_j / l^2) exp(-d^2 / 2 l^2)        i, j = x, y
+    covariance(g_i, g_j) = sigma^2 (delta_ij - d_i d_j / l^2) exp(-d^2 / 2 l^2)        i, j = x, y
 
 (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, section 9.4). Being a gradient it has
 no curl: what pulls forward on one side of a wave pulls back on the other, and around a lap nothing is won.

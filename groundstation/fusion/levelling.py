@@ -26,13 +26,13 @@ class LegAdvice:
     name: str
     raise_m: float
     """Above what it is now; the leg that needs least stays, so this is never below zero."""
-    std_m: float
+    sigma_m: float
     """Against the leg that stays."""
 
     @property
     def must_be_raised(self) -> bool:
         """Whether it differs from level by more than its uncertainty."""
-        return self.raise_m > max(SIGMAS * self.std_m, COARSEST_M)
+        return self.raise_m > max(SIGMAS * self.sigma_m, COARSEST_M)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +48,11 @@ class Levelling:
     def sentences(self) -> list[str]:
         """Return the advice in words."""
         if self.is_level:
-            within = max(leg.raise_m + leg.std_m for leg in self.legs)
+            within = max(leg.raise_m + leg.sigma_m for leg in self.legs)
             return [f"The table is level within {1e3 * within:.2f} mm at its legs: leave them."]
         lines = []
         for leg in self.legs:
-            spread = f"(± {1e3 * leg.std_m:.2f} mm)"
+            spread = f"(± {1e3 * leg.sigma_m:.2f} mm)"
             if not leg.must_be_raised:
                 lines.append(f"Leave leg {leg.name} as it is.")
             else:
@@ -61,7 +61,7 @@ class Levelling:
 
 
 def levelling(
-    mean_m_s2: tuple[float, float], cov_m2_s4: Array, legs_m: Mapping[str, tuple[float, float]]
+    mean_m_s2: tuple[float, float], covariance_m2_s4: Array, legs_m: Mapping[str, tuple[float, float]]
 ) -> Levelling:
     """Advise how to level a table.
 
@@ -70,7 +70,7 @@ def levelling(
 
     Args:
         mean_m_s2: mean acceleration over the table, table frame.
-        cov_m2_s4: (2, 2) its covariance.
+        covariance_m2_s4: (2, 2) its covariance.
         legs_m: where the legs stand, table frame.
 
     Raises:
@@ -85,9 +85,9 @@ def levelling(
     lift = places @ np.asarray(mean_m_s2) / G_M_S2  # minus the height of the plane
     lowest = int(np.argmin(lift))
     apart = places - places[lowest]
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", apart, cov_m2_s4, apart), 0.0)) / G_M_S2
+    sigma = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", apart, covariance_m2_s4, apart), 0.0)) / G_M_S2
     legs = tuple(
-        LegAdvice(name, float(lift[i] - lift[lowest]), float(std[i])) for i, name in enumerate(legs_m)
+        LegAdvice(name, float(lift[i] - lift[lowest]), float(sigma[i])) for i, name in enumerate(legs_m)
     )
     is_level = not any(leg.must_be_raised for leg in legs)
-    return Levelling(legs, is_level, float(std.max()))
+    return Levelling(legs, is_level, float(sigma.max()))

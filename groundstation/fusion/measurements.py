@@ -23,7 +23,7 @@ MAX_REST_SPREAD = 2.5
 """A rest whose readings spread wider than this many sigmas of the white noise was not one."""
 
 
-def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) -> tuple[Array, Array]:
+def predict_fix(fix: Fix, x: Array, rate_read_rad_s: float, noise: NoiseModel) -> tuple[Array, Array]:
     """Return innovation (3,) of x, y, heading and its Jacobian (3, 23) at the exposure.
 
     The star camera sees the body's origin now; the state is the IMU point's, seen through the sensors'
@@ -32,11 +32,11 @@ def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) 
     Args:
         fix: pose of the body's origin.
         x: (23,) nominal state at the exposure.
-        omega_read_rad_s: the gyro's reading at the exposure.
+        rate_read_rad_s: the gyro's reading at the exposure.
         noise: lags.
     """
     H = np.zeros((3, es.SIZE))
-    w = omega_read_rad_s - x[es.GYRO_BIAS]
+    w = rate_read_rad_s - x[es.GYRO_BIAS]
     theta = x[es.THETA] + noise.gyro_lag_s * w
     c, s = math.cos(theta), math.sin(theta)
     rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
@@ -61,10 +61,10 @@ def predict_fix(fix: Fix, x: Array, omega_read_rad_s: float, noise: NoiseModel) 
     return z, H
 
 
-def fix_covariance(fix: Fix, x: Array, omega_rad_s: float, noise: NoiseModel) -> Array:
+def fix_covariance(fix: Fix, x: Array, rate_rad_s: float, noise: NoiseModel) -> Array:
     """Return the fix's covariance (3, 3) with what an exposure's uncertain stamp adds to a moving vehicle."""
-    moved = np.array([x[es.VX], x[es.VY], omega_rad_s]) * noise.fix_time_sigma_s
-    return np.asarray(fix.cov + moved[:, None] * moved)
+    moved = np.array([x[es.VX], x[es.VY], rate_rad_s]) * noise.fix_time_sigma_s
+    return np.asarray(fix.covariance + moved[:, None] * moved)
 
 
 def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_sigma_m_s: float) -> None:
@@ -86,7 +86,7 @@ def take_pose(fix: Fix, x: Array, P: Array, near_heading_rad: float, velocity_si
     P[: es.MOVING] = 0.0
     P[:, : es.MOVING] = 0.0
     order = [es.PX, es.PY, es.THETA]
-    P[np.ix_(order, order)] = fix.cov
+    P[np.ix_(order, order)] = fix.covariance
     P[es.VX, es.VX] = P[es.VY, es.VY] = velocity_sigma_m_s**2
     arm = np.eye(es.SIZE)  # the fix is of the body's origin: errors of heading and lever move the IMU point
     arm[es.PX, es.THETA], arm[es.PY, es.THETA] = -ly, lx
@@ -128,7 +128,7 @@ def learn_rest(
     n = int(good.sum())
     if n < MIN_REST_PACKETS:
         return None
-    readings = np.array([segment.omega_rad_s[good], segment.ax_m_s2[good], segment.ay_m_s2[good]])
+    readings = np.array([segment.rate_rad_s[good], segment.ax_m_s2[good], segment.ay_m_s2[good]])
     density = np.array(
         [noise.gyro_density_rad_s_rthz, noise.acc_density_m_s2_rthz, noise.acc_density_m_s2_rthz]
     )
@@ -165,13 +165,13 @@ def learn_rest(
     return Corrected(H, K, weight, z)
 
 
-def reported(x: Array, omega_rad_s: float) -> Array:
-    """Return the Jacobian (6, 23) of x, y, heading, vx, vy, omega of the centre of mass."""
+def reported(x: Array, rate_rad_s: float) -> Array:
+    """Return the Jacobian (6, 23) of x, y, heading, vx, vy, rate of the centre of mass."""
     H = np.zeros((6, es.SIZE))
     c, s = math.cos(x[es.THETA]), math.sin(x[es.THETA])
     rx, ry = x[es.LEVER_X], x[es.LEVER_Y]
     lx, ly = c * rx - s * ry, s * rx + c * ry
-    w = omega_rad_s
+    w = rate_rad_s
     H[0, es.PX] = H[1, es.PY] = H[2, es.THETA] = H[3, es.VX] = H[4, es.VY] = 1.0
     H[0, es.THETA], H[1, es.THETA] = ly, -lx
     H[0, es.LEVER_X], H[0, es.LEVER_Y], H[1, es.LEVER_X], H[1, es.LEVER_Y] = -c, s, -s, -c
@@ -183,11 +183,11 @@ def reported(x: Array, omega_rad_s: float) -> Array:
     return H
 
 
-def add_scale_in_time(variance: list[float], P: Array, omega_rad_s: float) -> None:
+def add_scale_in_time(variance: list[float], P: Array, rate_rad_s: float) -> None:
     """Add to the heading's coefficients, in place, what the gyro's scale adds while turning at a rate.
 
     The rate's error is -(b_g + w s_g); `LateFix.variance_in_time` has the first part.
     """
-    g, k, w = es.GYRO_BIAS, es.GYRO_SCALE, omega_rad_s
+    g, k, w = es.GYRO_BIAS, es.GYRO_SCALE, rate_rad_s
     variance[11] -= 2.0 * w * float(P[es.THETA, k])
     variance[12] += float(2.0 * w * P[g, k] + w * w * P[k, k])

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion.error_state_filter import ErrorStateFilter
-from groundstation.fusion.estimator import Array, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.fusion.smoother import Smoothed, smooth
@@ -48,11 +48,11 @@ class OfflineSmoother:
         self._rows.append((packet.t_ns, self._filter.stamp_off_s if row >= 0 else 0.0, row))
         return state
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Take a fix."""
         return self._filter.add_fix(fix)
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait."""
         return self._filter.settled()
 
@@ -68,9 +68,9 @@ class OfflineSmoother:
         """Say which accelerometers are not believed from this stamp on."""
         self._filter.doubt_forces(t_ns, x=x, y=y)
 
-    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+    def expected_forces(self, rate_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
         """Return what the accelerometers would read under a known push."""
-        return self._filter.expected_forces(omega_rad_s, push_m_s2, turn_rad_s2)
+        return self._filter.expected_forces(rate_rad_s, push_m_s2, turn_rad_s2)
 
     def slope_left(self) -> tuple[float, float]:
         """Return the table's pull beyond the map, causal."""
@@ -95,7 +95,7 @@ class OfflineSmoother:
         state = smoothed.state[rows]
         state[:, :2] += off * state[:, 3:5]
         state[:, 2:3] += off * state[:, 5:6]
-        values, sigmas = state.tolist(), smoothed.std[rows].tolist()
+        values, sigmas = state.tolist(), smoothed.sigma[rows].tolist()
         return [
             None if row < 0 or value[0] != value[0] else PlanarState._make([t_ns, *value, *sigma, False])
             for (t_ns, _, row), value, sigma in zip(self._rows, values, sigmas, strict=True)

@@ -16,7 +16,7 @@ class OffsetFit:
 
     mu_m_s2: float
     nu_m_s2: float
-    cov: Array
+    covariance: Array
     """(2, 2) m^2/s^4: the fixes' sigma through the fit and through the start's finite difference, widened by
     the residual where that is larger than the fixes explain."""
     residual_rms_m: float
@@ -86,6 +86,6 @@ def fit_offsets(
     gain = np.linalg.solve(normal, A.T) @ np.kron(np.eye(2), noise)
     expected = np.trace(noise @ noise.T) / (m - 1) * fix_sigma_m**2
     widening = max(1.0, float(np.mean(left**2)) / expected)
-    cov = gain @ gain.T * fix_sigma_m**2 * widening
+    covariance = gain @ gain.T * fix_sigma_m**2 * widening
     rms = float(np.sqrt(np.mean(left**2)))
-    return OffsetFit(float(found[0]), float(found[1]), cov, rms, len(fix_s), left.reshape(2, -1))
+    return OffsetFit(float(found[0]), float(found[1]), covariance, rms, len(fix_s), left.reshape(2, -1))

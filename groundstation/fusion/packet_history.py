@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 COLUMNS = 7
-"""end s, span s, omega rad/s, ax, ay m/s^2, temperature above reference K, 1 where nothing was measured."""
+"""end s, span s, rate rad/s, ax, ay m/s^2, temperature above reference K, 1 where nothing was measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,7 +20,7 @@ class Segment:
 
     end_s: Array
     span_s: Array
-    omega_rad_s: Array
+    rate_rad_s: Array
     ax_m_s2: Array
     ay_m_s2: Array
     warmth_k: Array
@@ -64,7 +64,7 @@ class PacketHistory:
         """Drop everything."""
         del self.rows[:]
 
-    def omega_at(self, t_s: float) -> float:
+    def rate_at(self, t_s: float) -> float:
         """Return the gyro's reading in the packet that covers `t_s`, or in the nearest one."""
         n = len(self.rows) // COLUMNS
         ends = np.frombuffer(self.rows)[::COLUMNS]

@@ -122,9 +122,9 @@ class Reckoner:
         return int(self.now.newest_ns)
 
     @property
-    def omega_rad_s(self) -> float:
+    def rate_rad_s(self) -> float:
         """Rate now, corrected."""
-        return float(self.now.omega)
+        return float(self.now.rate)
 
     @property
     def is_lost(self) -> bool:
@@ -223,9 +223,9 @@ class Reckoner:
         self.has_pose = now.has_pose = True
         self._unpack(x, moved)
         if now.rest_from_s <= now.newest_s <= now.rest_to_s:
-            now.omega = now.force_x = now.force_y = 0.0
+            now.rate = now.force_x = now.force_y = 0.0
         else:
-            now.omega = (now.good.omega - now.bg) * now.gyro_gain
+            now.rate = (now.good.rate - now.bg) * now.gyro_gain
 
     def _unpack(self, state: Array, moved: Array) -> None:
         x, now = state.tolist(), self.now

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from groundstation.fusion.estimator import Array, Counters, Fix, FixAccount, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offset_fit import fit_offsets
@@ -41,15 +41,15 @@ class ReintegrationEstimator:
         self._t_ns = 0
         self._rest_from: float | None = None
         self._flight_from: float | None = None
-        self._offsets = np.zeros(3)  # omega, mu, nu
+        self._offsets = np.zeros(3)  # rate, mu, nu
         self._is_fitted = False
         self._fixes: list[tuple[float, float, float, float]] = []  # exposure, IMU point x, y, heading
         self._pose: list[float] | None = None  # theta, vx, vy, px, py of the IMU point
         self._pose_at_fix: list[float] = []  # the same at the exposure of the newest fix
-        self._omega = 0.0
+        self._rate = 0.0
         self._last = (0.0, 0.0, 0.0)
         self._waiting: list[Fix] = []
-        self._accounts: list[FixAccount] = []
+        self._accounts: list[FixOutcome] = []
 
     def begin_rest(self, t_ns: int) -> None:
         """Say that from this stamp the vehicle stands still."""
@@ -68,7 +68,7 @@ class ReintegrationEstimator:
     def _calibrate(self, start_s: float, stop_s: float) -> None:
         rest = self._history.between(start_s, stop_s)
         if len(rest.span_s):
-            self._offsets = np.array([rest.omega_rad_s.mean(), rest.ax_m_s2.mean(), rest.ay_m_s2.mean()])
+            self._offsets = np.array([rest.rate_rad_s.mean(), rest.ax_m_s2.mean(), rest.ay_m_s2.mean()])
 
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Integrate one packet; readings outside the gates are replaced by the last good ones."""
@@ -76,27 +76,27 @@ class ReintegrationEstimator:
         if packet.t_ns <= self._t_ns:
             self.counters.add("packet_stamp_not_after_the_last")
             return None
-        omega, ax, ay = packet.omega_rad_s, packet.ax_m_s2, packet.ay_m_s2
-        if not (abs(omega) <= MAX_RATE_RAD_S and abs(ax) <= MAX_ACC_M_S2 and abs(ay) <= MAX_ACC_M_S2):
+        rate, ax, ay = packet.rate_rad_s, packet.ax_m_s2, packet.ay_m_s2
+        if not (abs(rate) <= MAX_RATE_RAD_S and abs(ax) <= MAX_ACC_M_S2 and abs(ay) <= MAX_ACC_M_S2):
             self.counters.add("packet_outside_the_gates")
-            omega, ax, ay = self._last
-        self._last = (omega, ax, ay)
+            rate, ax, ay = self._last
+        self._last = (rate, ax, ay)
         self._t_ns = packet.t_ns
         t = self._seconds(packet.t_ns)
-        self._history.rows.extend((t, packet.dt_s, omega, ax, ay, 0.0, 0.0))
+        self._history.rows.extend((t, packet.dt_s, rate, ax, ay, 0.0, 0.0))
         for fix in self._waiting:
             self._accounts.append(self.add_fix(fix))
         self._waiting.clear()
         if self._pose is None:
             return None
         if self._rest_from is None:
-            self._pose = self._integrate(self._pose, packet.dt_s, omega, ax, ay)
-            self._omega = omega - float(self._offsets[0])
+            self._pose = self._integrate(self._pose, packet.dt_s, rate, ax, ay)
+            self._rate = rate - float(self._offsets[0])
         return self.state()
 
-    def _integrate(self, pose: list[float], dt: float, omega: float, ax: float, ay: float) -> list[float]:
+    def _integrate(self, pose: list[float], dt: float, rate: float, ax: float, ay: float) -> list[float]:
         theta, vx, vy, px, py = pose
-        w = omega - float(self._offsets[0])
+        w = rate - float(self._offsets[0])
         fx, fy = ax - float(self._offsets[1]), ay - float(self._offsets[2])
         middle = theta + 0.5 * w * dt
         c, s = math.cos(middle), math.sin(middle)
@@ -125,7 +125,7 @@ class ReintegrationEstimator:
             return None
         theta, vx, vy, px, py = self._pose
         lx, ly = self._lever(theta)
-        w = self._omega
+        w = self._rate
         bias, mu, nu = self._offsets.tolist()
         xy, heading = self.noise.star_sigma_xy_m, self.noise.star_sigma_heading_rad
         return PlanarState(
@@ -148,7 +148,7 @@ class ReintegrationEstimator:
     def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
         """The published method knows no uncertainty that could grow."""
 
-    def expected_forces(self, omega_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
+    def expected_forces(self, rate_rad_s: float, push_m_s2: Pair, turn_rad_s2: float) -> Pair:
         """Return the constant offsets and the push; turning is left out."""
         _, mu, nu = self._offsets.tolist()
         return mu + push_m_s2[0], nu + push_m_s2[1]
@@ -164,12 +164,12 @@ class ReintegrationEstimator:
         C[:3, :3] = np.diag([xy, xy, heading])
         return C
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Hand over the accounts of fixes that had to wait for packets."""
         accounts, self._accounts = self._accounts, []
         return accounts
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Put the vehicle where the fix saw it, and integrate the packets since."""
         t = self._seconds(fix.t_exposure_ns)
         complaint = complaint_about(fix)
@@ -200,7 +200,7 @@ class ReintegrationEstimator:
             self._fixes = self._fixes[-2:]
         return self._used(fix, predicted)
 
-    def _used(self, fix: Fix, predicted: list[float] | None) -> FixAccount:
+    def _used(self, fix: Fix, predicted: list[float] | None) -> FixOutcome:
         account = self._account(fix, "used")
         if predicted is None:
             return account
@@ -226,7 +226,7 @@ class ReintegrationEstimator:
             return
         t = np.array([f[0] for f in flight])
         segment = self._history.between(t[0] - 0.1, t[-1])
-        step = (segment.omega_rad_s - self._offsets[0]) * segment.span_s
+        step = (segment.rate_rad_s - self._offsets[0]) * segment.span_s
         turned = np.cumsum(step)
         heading = flight[0][3] + turned - np.interp(t[0], segment.end_s, turned) - 0.5 * step
         force = np.array([segment.ax_m_s2, segment.ay_m_s2])
@@ -240,16 +240,16 @@ class ReintegrationEstimator:
     def _columns(segment: Segment) -> list[list[float]]:
         return [
             segment.span_s.tolist(),
-            segment.omega_rad_s.tolist(),
+            segment.rate_rad_s.tolist(),
             segment.ax_m_s2.tolist(),
             segment.ay_m_s2.tolist(),
         ]
 
-    def _account(self, fix: Fix, reason: str) -> FixAccount:
+    def _account(self, fix: Fix, reason: str) -> FixOutcome:
         if reason != "used":
             self.counters.add("fix_" + reason.replace(" ", "_"))
         nan = math.nan
-        return FixAccount(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan, fix.source)
+        return FixOutcome(fix.t_exposure_ns, reason == "used", reason, nan, nan, nan, nan, fix.source)
 
     def _lever(self, theta: float) -> tuple[float, float]:
         c, s = math.cos(theta), math.sin(theta)

@@ -28,7 +28,7 @@ class SlopeGrid:
     step_m: float
     pull_x_m_s2: Array
     pull_y_m_s2: Array
-    std_m_s2: Array
+    sigma_m_s2: Array
     """Sigma of the pull, per axis."""
     mean_m_s2: tuple[float, float]
 
@@ -76,13 +76,13 @@ def noise_with(noise: NoiseModel, grid: SlopeGrid) -> NoiseModel:
 
     The best-known quarter of the grid is where vehicles fly; a little more than its sigma is left to do.
     """
-    left = min(1.25 * float(np.percentile(grid.std_m_s2, 25)), noise.waviness_sigma_m_s2)
+    left = min(1.25 * float(np.percentile(grid.sigma_m_s2, 25)), noise.waviness_sigma_m_s2)
     return replace(noise, slope_sigma_m_s2=RELEVELLING_SIGMA_M_S2, waviness_sigma_m_s2=left)
 
 
 def slope_grid(found: TableMap) -> SlopeGrid:
     """Return a map as filters and controllers read it."""
-    std = np.sqrt(0.5 * (found.std_x_m_s2**2 + found.std_y_m_s2**2))
+    sigma = np.sqrt(0.5 * (found.sigma_x_m_s2**2 + found.sigma_y_m_s2**2))
     return SlopeGrid(
-        found.x_min_m, found.y_min_m, found.step_m, found.ax_m_s2, found.ay_m_s2, std, found.mean_m_s2
+        found.x_min_m, found.y_min_m, found.step_m, found.ax_m_s2, found.ay_m_s2, sigma, found.mean_m_s2
     )

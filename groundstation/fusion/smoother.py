@@ -32,8 +32,8 @@ class Smoothed:
     t_s: Array
     """(n,) ends of the packets since the filter's origin; holes have rows of their own."""
     state: Array
-    """(n, 9) x, y, heading, vx, vy, omega, bias_omega, bias_ax, bias_ay."""
-    std: Array
+    """(n, 9) x, y, heading, vx, vy, rate, bias_omega, bias_ax, bias_ay."""
+    sigma: Array
     """(n, 3) of x, y, heading."""
     nodes: list[Node]
 
@@ -51,7 +51,7 @@ def smooth(
     """
     t = np.array(history.rows[::7])
     state = np.full((len(t), 9), math.nan)
-    std = np.full((len(t), 3), math.nan)
+    sigma = np.full((len(t), 3), math.nan)
     all_nodes: list[Node] = []
     for number, chain in enumerate(trace.chains):
         nodes = smooth_chain(chain)
@@ -65,10 +65,10 @@ def smooth(
             if rows.stop > rows.start:
                 segment = history.between(before.t_s, after.t_s)
                 whole = rows.stop - rows.start  # the packet that the step's end cuts belongs to the next
-                moved, sigma = _between(before, after, segment, noise, table_map)
-                state[rows], std[rows] = moved[:whole], sigma[:whole]
+                moved, moved_sigma = _between(before, after, segment, noise, table_map)
+                state[rows], sigma[rows] = moved[:whole], moved_sigma[:whole]
         all_nodes += nodes
-    return Smoothed(t, state, std, all_nodes)
+    return Smoothed(t, state, sigma, all_nodes)
 
 
 def _between(
@@ -79,15 +79,15 @@ def _between(
     n = len(segment.span_s)
     dt = segment.span_s
     if after.is_rest:
-        omega, theta = np.zeros(n), np.full(n, after.x[es.THETA])
+        rate, theta = np.zeros(n), np.full(n, after.x[es.THETA])
         v, p, a = np.zeros((2, n)), np.repeat(after.x[es.PX : es.PY + 1, None], n, axis=1), np.zeros((2, n))
         share = np.ones(n)
     else:
         warm = segment.warmth_k
-        omega = (segment.omega_rad_s - x[es.GYRO_BIAS] - x[es.GYRO_TEMPCO] * warm) * (1.0 - x[es.GYRO_SCALE])
-        theta = x[es.THETA] + np.cumsum(omega * dt)
+        rate = (segment.rate_rad_s - x[es.GYRO_BIAS] - x[es.GYRO_TEMPCO] * warm) * (1.0 - x[es.GYRO_SCALE])
+        theta = x[es.THETA] + np.cumsum(rate * dt)
         pull = x[es.SLOPE_X : es.SLOPE_Y + 1] + x[es.WAVE_X : es.WAVE_Y + 1]
-        a = _forces(x, segment, omega, noise) + pull[:, None]
+        a = _forces(x, segment, rate, noise) + pull[:, None]
         if table_map is not None:
             began = np.cumsum(dt) - 0.5 * dt
             a = a + table_map.along(x[es.PX] + x[es.VX] * began, x[es.PY] + x[es.VY] * began)
@@ -102,7 +102,7 @@ def _between(
         dv, dp = left[es.VX : es.VY + 1, None], left[es.PX : es.PY + 1, None]
         p = p + (3 * share**2 - 2 * share**3) * dp + (share**3 - share**2) * T * dv
         v = v + 6 * (share - share**2) / T * dp + (3 * share**2 - 2 * share) * dv
-    theta = theta + noise.gyro_lag_s * omega
+    theta = theta + noise.gyro_lag_s * rate
     p = p + noise.acc_lag_s * v
     v = v + noise.acc_lag_s * a
     c, s = np.cos(theta), np.sin(theta)
@@ -117,21 +117,21 @@ def _between(
         after.x[es.ACC_BIAS_X] + after.x[es.ACC_TEMPCO_X] * warmth - (c * g[0] + s * g[1]),
         after.x[es.ACC_BIAS_Y] + after.x[es.ACC_TEMPCO_Y] * warmth - (c * g[1] - s * g[0]),
     ]
-    state = np.column_stack([p[0] - lx, p[1] - ly, theta, v[0] + omega * ly, v[1] - omega * lx, omega, *bias])
+    state = np.column_stack([p[0] - lx, p[1] - ly, theta, v[0] + rate * ly, v[1] - rate * lx, rate, *bias])
     ends = [np.diag(measurements.reported(node.x, 0.0) @ node.P @ measurements.reported(node.x, 0.0).T)
             for node in (before, after)]  # fmt: skip
     variance = np.outer(1.0 - share, ends[0][:3]) + np.outer(share, ends[1][:3])
     return state, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _forces(x: Array, segment: Segment, omega_rad_s: Array, noise: NoiseModel) -> Array:
+def _forces(x: Array, segment: Segment, rate_rad_s: Array, noise: NoiseModel) -> Array:
     """Return the specific force (2, n) of each packet, corrected, table frame.
 
     Forces are as old as their filter, so they are turned by the heading of that moment.
     """
-    step = omega_rad_s * segment.span_s
+    step = rate_rad_s * segment.span_s
     middle = np.cumsum(step) - 0.5 * step
-    theta = middle + (x[es.THETA] + (noise.gyro_lag_s - noise.acc_lag_s) * omega_rad_s)
+    theta = middle + (x[es.THETA] + (noise.gyro_lag_s - noise.acc_lag_s) * rate_rad_s)
     ux = segment.ax_m_s2 - x[es.ACC_BIAS_X] - x[es.ACC_TEMPCO_X] * segment.warmth_k
     uy = segment.ay_m_s2 - x[es.ACC_BIAS_Y] - x[es.ACC_TEMPCO_Y] * segment.warmth_k
     mxx, mxy, myx, myy = x[es.ACC_MATRIX : es.ACC_MATRIX + 4]

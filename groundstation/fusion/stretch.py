@@ -31,7 +31,7 @@ def fit_stretch(
     """Fit (mu, nu) over a stretch of a recording.
 
     Args:
-        imu: (n, >= 4) stamp s, omega, ax, ay; ascending.
+        imu: (n, >= 4) stamp s, rate, ax, ay; ascending.
         stars: (m, 5) exposure s, arrival s, x, y, heading.
         start_s: start of the stretch.
         end_s: its end.

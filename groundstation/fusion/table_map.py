@@ -23,7 +23,14 @@ Array = NDArray[np.float64]
 
 G_M_S2 = 9.80665
 """Standard gravity (3rd CGPM, 1901)."""
-_ARRAYS = ("ax_m_s2", "ay_m_s2", "std_x_m_s2", "std_y_m_s2", "height_m")
+_ARRAYS = {
+    "ax_m_s2": "ax_m_s2",
+    "ay_m_s2": "ay_m_s2",
+    "sigma_x_m_s2": "std_x_m_s2",
+    "sigma_y_m_s2": "std_y_m_s2",
+    "height_m": "height_m",
+}
+"""Arrays of a map, and their names in the file of its grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +51,7 @@ class TableMap:
     """Acceleration of an unpushed vehicle over the table, table frame; arrays (rows over y, columns over x).
 
     It is what accelerometers do not feel: gravity along the surface. Between grid points it is bilinear;
-    outside it is the mean slope, with `far_std_m_s2`.
+    outside it is the mean slope, with `far_sigma_m_s2`.
     """
 
     x_min_m: float
@@ -52,15 +59,15 @@ class TableMap:
     step_m: float
     ax_m_s2: Array
     ay_m_s2: Array
-    std_x_m_s2: Array
-    std_y_m_s2: Array
+    sigma_x_m_s2: Array
+    sigma_y_m_s2: Array
     height_m: Array
     """Of the surface about the mean plane, mean zero."""
     mean_m_s2: tuple[float, float]
     """Average over the table."""
-    mean_cov_m2_s4: Array
+    mean_covariance_m2_s4: Array
     """(2, 2)."""
-    far_std_m_s2: float
+    far_sigma_m_s2: float
     """Sigma, per axis, where nothing is known but the mean slope."""
     provenance: MapProvenance
 
@@ -99,12 +106,12 @@ class TableMap:
             return self.mean_m_s2
         return self._between(self.ax_m_s2, *cell), self._between(self.ay_m_s2, *cell)
 
-    def std_m_s2(self, x_m: float, y_m: float) -> tuple[float, float]:
+    def sigma_m_s2(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Return the standard deviation of the acceleration at one place, per axis."""
         cell = self._cell(x_m, y_m)
         if cell is None:
-            return self.far_std_m_s2, self.far_std_m_s2
-        return self._between(self.std_x_m_s2, *cell), self._between(self.std_y_m_s2, *cell)
+            return self.far_sigma_m_s2, self.far_sigma_m_s2
+        return self._between(self.sigma_x_m_s2, *cell), self._between(self.sigma_y_m_s2, *cell)
 
     def accelerations_m_s2(self, position_m: Array) -> Array:
         """Return the acceleration (n, 2) at positions (n, 2)."""
@@ -136,14 +143,16 @@ class TableMap:
     def files(self, path: Path) -> dict[Path, bytes | str]:
         """Return what is written: `path` (TOML) and the grid beside it (`.npz`)."""
         memory = io.BytesIO()
-        np.savez_compressed(memory, **{name: getattr(self, name) for name in _ARRAYS}, allow_pickle=False)
+        np.savez_compressed(
+            memory, **{key: getattr(self, name) for name, key in _ARRAYS.items()}, allow_pickle=False
+        )
         grid, grid_path = memory.getvalue(), path.with_suffix(".npz")
         text = self._text(grid_path.name, hashlib.sha256(grid).hexdigest())
         return {grid_path: grid, path: text}
 
     def _text(self, grid_name: str, grid_sha256: str) -> str:
         origin = self.provenance
-        std = np.sqrt(self.mean_cov_m2_s4.diagonal())
+        sigma = np.sqrt(self.mean_covariance_m2_s4.diagonal())
         lines = ["# Table map: what pulls an unpushed vehicle along the table, by place", ""]
         lines += toml_lines({"made_utc": origin.made_utc})
         lines += toml_table(
@@ -158,12 +167,14 @@ class TableMap:
                 "rows": self.ax_m_s2.shape[0],
             },
         )
-        mean = {"value": list(self.mean_m_s2), "std": std.tolist(), "unit": "m/s^2"}
-        tilt = [self.mean_gradient_rad, (std / G_M_S2).tolist()]
+        mean = {"value": list(self.mean_m_s2), "std": sigma.tolist(), "unit": "m/s^2"}
+        tilt = [self.mean_gradient_rad, (sigma / G_M_S2).tolist()]
         lines += toml_table("mean.acceleration", mean)
-        lines += toml_table("mean.covariance", {"value": self.mean_cov_m2_s4.tolist(), "unit": "m^2/s^4"})
+        lines += toml_table(
+            "mean.covariance", {"value": self.mean_covariance_m2_s4.tolist(), "unit": "m^2/s^4"}
+        )
         lines += toml_table("mean.uphill_gradient", {"value": tilt[0], "std": tilt[1], "unit": "rad"})
-        lines += toml_table("unvisited_std", {"value": self.far_std_m_s2, "unit": "m/s^2"})
+        lines += toml_table("unvisited_std", {"value": self.far_sigma_m_s2, "unit": "m/s^2"})
         lines += toml_table("residual.chi_square_ratio", {"value": origin.residual_ratio, "unit": "1"})
         lines += toml_table("flown", {"value": origin.flown_s, "unit": "s"})
         if origin.notes:
@@ -212,8 +223,8 @@ class TableMap:
             step_m=float(grid["step_m"]),
             **grids,
             mean_m_s2=(float(mean["acceleration"]["value"][0]), float(mean["acceleration"]["value"][1])),
-            mean_cov_m2_s4=np.array(mean["covariance"]["value"], dtype=np.float64).reshape(2, 2),
-            far_std_m_s2=float(text["unvisited_std"]["value"]),
+            mean_covariance_m2_s4=np.array(mean["covariance"]["value"], dtype=np.float64).reshape(2, 2),
+            far_sigma_m_s2=float(text["unvisited_std"]["value"]),
             provenance=MapProvenance(
                 text["made_utc"].astimezone(UTC),
                 {row["name"]: row["sha256"] for row in text["recordings"]},
@@ -234,4 +245,4 @@ def _parse_grid(path: Path, text: dict[str, Any], read: Callable[[Path], bytes])
     if hashlib.sha256(data).hexdigest() != text["grid"]["sha256"]:
         raise FileError(f"{grid_path} is not the grid that {path} was written with (SHA-256 differs).")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        return {name: np.asarray(arrays[name], dtype=np.float64) for name in _ARRAYS}
+        return {name: np.asarray(arrays[key], dtype=np.float64) for name, key in _ARRAYS.items()}

@@ -8,7 +8,6 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig import Rig
 from groundstation.recording.policy import ImagePolicy
-from groundstation.rig.plan import config_crc
 from groundstation.runners.live import LiveProcess
 from groundstation.runners.slot import Sequences, Slot
 
@@ -29,7 +28,7 @@ def run_beside(rig: Rig, endpoint: str, name: str, node: Node, is_done: Callable
     process = f"{name}_{os.getpid()}"
     journal, sequences = JournalWriter(), Sequences()
     key = f"{node.vehicle}/{name}" if node.vehicle else name
-    slot = Slot(key, node, process, config_crc(rig), journal, sequences, measure=True)
+    slot = Slot(key, node, process, journal, sequences, measure=True)
     with ZenohBus(endpoint) as bus:
         LiveProcess(
             process,

@@ -30,7 +30,7 @@ class Arc:
     """A circle found by part of its rim: centre x + iy (m) and covariance (2, 2) in m^2."""
 
     place_m: complex
-    cov_m2: Array
+    covariance_m2: Array
 
 
 def circles_of_rim(share: Array, places: Places, radius_m: float, pitch_m: float) -> list[Arc]:
@@ -51,12 +51,12 @@ def circles_of_rim(share: Array, places: Places, radius_m: float, pitch_m: float
         refined = None if centre is None else _refine(rim, centre, radius_m, pitch_m)
         if refined is None:
             break
-        place, cov, on_it = refined
+        place, covariance, on_it = refined
         rim = rim[~on_it]
         if _is_filled(share, places, place, radius_m) and not any(
             abs(place - other.place_m) < 1.5 * radius_m for other in found
         ):
-            found.append(Arc(place, cov))
+            found.append(Arc(place, covariance))
     return found
 
 
@@ -110,9 +110,9 @@ def _refine(
         return None
     scatter = 1.4826 * float(np.median(np.abs(np.abs(rim[near] - centre) - radius_m)))
     sigma = max(scatter, _RIM_SIGMA_PX * pitch_m)
-    cov = np.linalg.inv(information) * (sigma**2 * _CROSSINGS_PER_POINT)
+    covariance = np.linalg.inv(information) * (sigma**2 * _CROSSINGS_PER_POINT)
     taken = np.abs(np.abs(rim - centre) - radius_m) < 2.0 * _NEAR_PX * pitch_m
-    return centre, np.asarray(cov), taken
+    return centre, np.asarray(covariance), taken
 
 
 def _is_filled(share: Array, places: Places, centre: complex, radius_m: float) -> bool:

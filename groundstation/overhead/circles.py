@@ -69,13 +69,13 @@ class SeenCircle:
     Attributes:
         colour: Its name.
         place_m: Centre x + iy, table frame.
-        cov_m2: Covariance (2, 2) of the centre.
+        covariance_m2: Covariance (2, 2) of the centre.
         is_whole: False where only part of the rim was seen.
     """
 
     colour: str
     place_m: complex
-    cov_m2: Array
+    covariance_m2: Array
     is_whole: bool
 
 
@@ -203,10 +203,10 @@ def _look_closer(
     )
     whole = _whole(shares, places, radius_m, settings)
     if whole is not None:
-        centre, cov = whole
-        return [SeenCircle(colour, centre, cov + np.eye(2) * (settings.floor_px * pitch_m) ** 2, True)]
+        centre, covariance = whole
+        return [SeenCircle(colour, centre, covariance + np.eye(2) * (settings.floor_px * pitch_m) ** 2, True)]
     arcs = circles_of_rim(shares.share, places, radius_m, pitch_m)
-    return [SeenCircle(colour, arc.place_m, arc.cov_m2, False) for arc in arcs]
+    return [SeenCircle(colour, arc.place_m, arc.covariance_m2, False) for arc in arcs]
 
 
 def _largest(mask: Picture) -> Picture:

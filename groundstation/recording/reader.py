@@ -22,7 +22,7 @@ from groundstation.bus.cdr import CodecError
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.declarations.message import Message
 from groundstation.declarations.topic import Topic
-from groundstation.recording.channels import parse_channel
+from groundstation.recording.channel_names import parse_channel
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import FORMAT, METADATA_NAME, RecordingInfo
 from groundstation.recording.records import (

@@ -19,7 +19,7 @@ from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.record_stream import Recorded
 from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.declarations.message import Message
-from groundstation.recording.channels import channel_name
+from groundstation.recording.channel_names import channel_name
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
 from groundstation.recording.mcap_file import McapFile

@@ -1,6 +1,5 @@
 """Which process runs what, and where its ports are opened: read from the rig and the tables of its parts."""
 
-import zlib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
@@ -70,11 +69,6 @@ def make_node(rig: Rig, key: str) -> Node:
     if vehicle not in row.vehicles(rig):
         raise KeyError(key)
     return row.make(rig, vehicle)
-
-
-def config_crc(rig: Rig) -> int:
-    """CRC-32 of everything that nodes are made from: the keys of the rig and the hashes of its files."""
-    return zlib.crc32(rig.model_dump_json().encode())
 
 
 def processes_of(rig: Rig) -> list[str]:

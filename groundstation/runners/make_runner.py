@@ -11,7 +11,7 @@ from groundstation.declarations.errors import RigError
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.declarations.rig import Rig
-from groundstation.rig.plan import config_crc, laboratory_ports
+from groundstation.rig.plan import laboratory_ports
 from groundstation.runners.lockstep import PROCESS, LockstepRunner, Observer
 from groundstation.runners.requests import RequestPlayer
 from groundstation.runners.slot import Sequences, Slot
@@ -56,10 +56,9 @@ def make_runner(
     asked = list(requests)
     if asked:
         extra.append(RequestPlayer(asked))
-    crc = config_crc(rig)
     for number, node in enumerate(extra):
         key = f"extra/{type(node).__name__}_{number}"
-        slots.append(Slot(key, node, PROCESS, crc, journal, sequences, measure=False))
+        slots.append(Slot(key, node, PROCESS, journal, sequences, measure=False))
     ports = laboratory_ports(rig, laboratory.channels())
     return LockstepRunner(slots, laboratory, ports, observers, journal, sequences)
 

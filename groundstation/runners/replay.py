@@ -157,7 +157,6 @@ class ReplayRunner:
                 continue
             self._leave(node)
             if kind == Kind.START:
-                self._report.config_crcs[node.key] = sequence
                 node.start(self._factory, journal.process, now_ns)
             elif kind == Kind.INPUT:
                 self._hand_over(node, noun, owner, sequence, now_ns)

@@ -81,7 +81,7 @@ class ReplayedNode:
         return None
 
     def _slot_of(self, node: Node) -> Slot:
-        return Slot(self.key, node, self._process, 0, NoJournal(), Sequences(), measure=False)
+        return Slot(self.key, node, self._process, NoJournal(), Sequences(), measure=False)
 
     def _keep(self, made: Iterable[Delivered], now_ns: int) -> None:
         self.published.extend((delivered.payload, now_ns) for delivered in made)

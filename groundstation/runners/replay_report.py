@@ -75,7 +75,6 @@ class ReplayReport:
         ticks: Ticks told to nodes.
         before_start: Journal entries of nodes before their first recorded start: left out.
         missing_inputs: Messages a node had consumed that are not in the recording, by ``node <- topic``.
-        config_crcs: Hash of configuration and calibration that each node started with then.
     """
 
     nodes: tuple[str, ...]
@@ -85,7 +84,6 @@ class ReplayReport:
     ticks: int = 0
     before_start: int = 0
     missing_inputs: dict[str, int] = field(default_factory=dict)
-    config_crcs: dict[str, int] = field(default_factory=dict)
 
     def differences(self) -> list[str]:
         """One sentence for each topic or input that does not agree."""

@@ -68,7 +68,6 @@ class Slot:
         key: ``vehicle/name``, or ``name`` for a node of the rig.
         node: The node.
         process: Name of the process, owner of its process-scoped topics.
-        config_crc: CRC-32 of configuration and calibration, journaled at the start.
         journal: The journal of the process, shared by its slots.
         sequences: The counters of the process, shared by its slots.
         measure: Whether wall and CPU times are measured (not in lockstep: they would differ per run).
@@ -80,7 +79,6 @@ class Slot:
     key: str
     node: Node
     process: str
-    config_crc: int
     journal: JournalWriter
     sequences: Sequences
     measure: bool
@@ -98,7 +96,7 @@ class Slot:
 
     def start(self, now_ns: int) -> list[Delivered]:
         """Journal the start and collect what the node publishes first."""
-        self.journal.note(Kind.START, self.key, "", self.process, self.config_crc, now_ns)
+        self.journal.note(Kind.START, self.key, "", self.process, 0, now_ns)
         return self._wrap(self.node.start(now_ns), now_ns, None)
 
     def receive(self, delivered: Delivered, now_ns: int) -> list[Delivered]:

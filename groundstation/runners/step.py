@@ -14,7 +14,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.port import Port
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Delivery, Pace, Scope
-from groundstation.rig.plan import config_crc, nodes_of
+from groundstation.rig.plan import nodes_of
 from groundstation.runners.slot import Sequences, Slot, Timing, owner_of
 
 JOURNAL_PERIOD_NS = 100_000_000
@@ -196,7 +196,6 @@ def build_slots(
     Raises:
         ValueError: A node refuses its configuration.
     """
-    crc = config_crc(rig)
     slots = []
     for row, vehicle, _ in nodes_of(rig, process):
         section = rig.nodes.get(row.name)
@@ -204,5 +203,5 @@ def build_slots(
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
         node = row.make(rig, vehicle)
-        slots.append(Slot(row.key(vehicle), node, process or name, crc, journal, sequences, measure, timing))
+        slots.append(Slot(row.key(vehicle), node, process or name, journal, sequences, measure, timing))
     return slots

@@ -48,18 +48,18 @@ class Referee:
     def __init__(self) -> None:
         self._pairs: deque[tuple[Array, Array, float]] = deque(maxlen=WINDOW)
 
-    def judge(self, difference: Array, cov: Array) -> tuple[float, Verdict]:
+    def judge(self, difference: Array, covariance: Array) -> tuple[float, Verdict]:
         """Take one pair.
 
         Args:
             difference: First source minus second at one moment: x, y (m), heading (rad, wrapped), shape (3,).
-            cov: Of the difference, (3, 3).
+            covariance: Of the difference, (3, 3).
 
         Returns:
             The pair's normalised difference squared, and the verdict over the last pairs.
         """
-        nis = float(difference @ np.linalg.solve(cov, difference))
-        self._pairs.append((difference, np.diag(cov), nis))
+        nis = float(difference @ np.linalg.solve(covariance, difference))
+        self._pairs.append((difference, np.diag(covariance), nis))
         return nis, verdict_of(list(self._pairs))
 
 
@@ -81,11 +81,11 @@ def verdict_of(pairs: list[tuple[Array, Array, float]]) -> Verdict:
 
 def _what(mean: Array, variances: Array, differences: Array) -> str:
     """Name the axis that is worst against what the sources say of themselves, and how it differs."""
-    std = np.sqrt(variances.mean(axis=0))
+    sigma = np.sqrt(variances.mean(axis=0))
     rms = np.sqrt((differences**2).mean(axis=0))
-    axis = int(np.argmax(rms / std))
+    axis = int(np.argmax(rms / sigma))
     unit, scale = ("deg", math.degrees(1.0)) if axis == len(_AXES) - 1 else ("mm", 1e3)
-    share = f"{rms[axis] / std[axis]:.1f} times what they say"
+    share = f"{rms[axis] / sigma[axis]:.1f} times what they say"
     if abs(mean[axis]) > 0.7 * rms[axis]:
         return f"{_AXES[axis]} by {scale * mean[axis]:+.2f} {unit} ({share})"
     return f"{_AXES[axis]} scatters by {scale * rms[axis]:.2f} {unit} ({share})"

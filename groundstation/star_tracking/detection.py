@@ -58,7 +58,7 @@ class Spots:
         u_px: Centres, shape (n,).
         v_px: Centres, shape (n,).
         flux_dn: Light above the background, shape (n,).
-        cov_px2: Covariance of the centres: uu, uv, vv, shape (n, 3).
+        covariance_px2: Covariance of the centres: uu, uv, vv, shape (n, 3).
         elongation: Long over short axis, 1 for round, shape (n,).
         streak_px: Motion streak (du, dv) fitted to the picture, its sign unknown, shape (n, 2).
         background_dn: Median background of the picture.
@@ -71,7 +71,7 @@ class Spots:
     u_px: NDArray[np.float64]
     v_px: NDArray[np.float64]
     flux_dn: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
+    covariance_px2: NDArray[np.float64]
     elongation: NDArray[np.float64]
     streak_px: NDArray[np.float64]
     background_dn: float

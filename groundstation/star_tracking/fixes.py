@@ -34,13 +34,13 @@ class PosePrior:
         x_table_m: Mean.
         y_table_m: Mean.
         heading_rad: Mean.
-        cov: Covariance (3, 3) of (x, y, heading) in m and rad.
+        covariance: Covariance (3, 3) of (x, y, heading) in m and rad.
     """
 
     x_table_m: float
     y_table_m: float
     heading_rad: float
-    cov: NDArray[np.float64]
+    covariance: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,18 +49,18 @@ class BodyMotion:
 
     vx_table_m_s: float
     vy_table_m_s: float
-    omega_rad_s: float
+    rate_rad_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StarFix:
+class PictureFix:
     """A pose with its covariance and its witnesses.
 
     Attributes:
         x_m: Body origin in the table.
         y_m: Body origin in the table.
         heading_rad: Heading in (-pi, pi].
-        cov: Covariance (3, 3) of (x, y, heading) in m and rad.
+        covariance: Covariance (3, 3) of (x, y, heading) in m and rad.
         stars: Number of stars that the pose rests on.
         mode: How they were found.
         spot_index: Which spots were matched, shape (stars,).
@@ -72,7 +72,7 @@ class StarFix:
     x_m: float
     y_m: float
     heading_rad: float
-    cov: NDArray[np.float64]
+    covariance: NDArray[np.float64]
     stars: int
     mode: Mode
     spot_index: NDArray[np.int64]
@@ -81,19 +81,19 @@ class StarFix:
     evidence_nats: float
 
     @property
-    def std_x_m(self) -> float:
+    def sigma_x_m(self) -> float:
         """One sigma of x."""
-        return float(np.sqrt(self.cov[0, 0]))
+        return float(np.sqrt(self.covariance[0, 0]))
 
     @property
-    def std_y_m(self) -> float:
+    def sigma_y_m(self) -> float:
         """One sigma of y."""
-        return float(np.sqrt(self.cov[1, 1]))
+        return float(np.sqrt(self.covariance[1, 1]))
 
     @property
-    def std_heading_rad(self) -> float:
+    def sigma_heading_rad(self) -> float:
         """One sigma of the heading."""
-        return float(np.sqrt(self.cov[2, 2]))
+        return float(np.sqrt(self.covariance[2, 2]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import NoFix, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix, PoseGuess, PosePrior
 from groundstation.star_tracking.projection import project
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
@@ -59,7 +59,7 @@ class PictureNotes:
 
 def take_notes(
     spots: Spots,
-    answer: StarFix | NoFix,
+    answer: PictureFix | NoFix,
     camera: CameraCalibration,
     catalogue: StarCatalogue,
     belief: PosePrior | None = None,
@@ -82,7 +82,7 @@ def take_notes(
         return PictureNotes(spot_px, kind, (), np.zeros((0, 2)), none, "", pose)
     rows, star_px = _in_picture(camera, catalogue, pose)
     spot_of_star = np.full(len(rows), NO_SPOT, dtype=np.uint8)
-    if isinstance(answer, StarFix):
+    if isinstance(answer, PictureFix):
         place = {int(row): i for i, row in enumerate(rows)}
         for spot, star in zip(answer.spot_index.tolist(), answer.star_index.tolist(), strict=True):
             if star in place:
@@ -94,14 +94,14 @@ def take_notes(
         spot_of_star[is_near] = nearest[is_near]
     kind = np.where(is_streak, SpotKind.STREAK, SpotKind.STRAY).astype(np.uint8)
     kind[spot_of_star[spot_of_star != NO_SPOT]] = SpotKind.STAR
-    if isinstance(answer, StarFix):
+    if isinstance(answer, PictureFix):
         kind[answer.spot_index] = SpotKind.STAR
     stars = tuple(catalogue.ids[row] for row in rows)
     return PictureNotes(spot_px, kind, stars, star_px, spot_of_star, basis, pose)
 
 
-def _basis(answer: StarFix | NoFix, belief: PosePrior | None) -> tuple[str, tuple[float, float, float]]:
-    if isinstance(answer, StarFix):
+def _basis(answer: PictureFix | NoFix, belief: PosePrior | None) -> tuple[str, tuple[float, float, float]]:
+    if isinstance(answer, PictureFix):
         return "fix", (answer.x_m, answer.y_m, answer.heading_rad)
     if isinstance(answer.guess, PoseGuess):
         return "guess", (answer.guess.x_m, answer.guess.y_m, answer.guess.heading_rad)

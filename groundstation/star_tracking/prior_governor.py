@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior
 
 _DISAGREEMENT = 21.1  # chi-square of three, 1 in 10,000
 
@@ -19,13 +19,13 @@ class GovernorSettings:
 
     Attributes:
         confirm_every: After so many fixes in tracking mode one is made lost in space.
-        max_std_m: A vaguer prior is not worth using.
-        max_std_heading_rad: A vaguer prior is not worth using.
+        max_sigma_m: A vaguer prior is not worth using.
+        max_sigma_heading_rad: A vaguer prior is not worth using.
     """
 
     confirm_every: int = 10
-    max_std_m: float = 0.02
-    max_std_heading_rad: float = 0.02
+    max_sigma_m: float = 0.02
+    max_sigma_heading_rad: float = 0.02
 
 
 class PriorGovernor:
@@ -41,13 +41,13 @@ class PriorGovernor:
         settings = self._settings
         if prior is None or not self._is_confirmed or self._tracked >= settings.confirm_every:
             return None
-        std = np.sqrt(np.diag(prior.cov))
+        sigma = np.sqrt(np.diag(prior.covariance))
         vague = not (
-            max(std[0], std[1]) <= settings.max_std_m and std[2] <= settings.max_std_heading_rad
+            max(sigma[0], sigma[1]) <= settings.max_sigma_m and sigma[2] <= settings.max_sigma_heading_rad
         )  # written so that a covariance of NaN is vague
         return None if vague else prior
 
-    def note(self, answer: StarFix | NoFix, prior: PosePrior | None = None) -> None:
+    def note(self, answer: PictureFix | NoFix, prior: PosePrior | None = None) -> None:
         """Learn what became of a picture.
 
         Args:
@@ -66,10 +66,10 @@ class PriorGovernor:
             self._is_confirmed = False
 
 
-def disagreement(fix: StarFix, prior: PosePrior) -> float:
+def disagreement(fix: PictureFix, prior: PosePrior) -> float:
     """Give the squared Mahalanobis distance of a fix from a prior that does not contain it."""
     turn = fix.heading_rad - prior.heading_rad
     off = np.array(
         [fix.x_m - prior.x_table_m, fix.y_m - prior.y_table_m, np.arctan2(np.sin(turn), np.cos(turn))]
     )
-    return float(off @ np.linalg.solve(fix.cov + prior.cov, off))
+    return float(off @ np.linalg.solve(fix.covariance + prior.covariance, off))

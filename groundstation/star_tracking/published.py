@@ -15,7 +15,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import Mode, NoFix, Refusal, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, Refusal
 from groundstation.star_tracking.rays import ceiling_points
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
@@ -47,7 +47,7 @@ class PublishedTracker:
         # Image axes turned against the body's by the mount, as seen on the ceiling.
         self._image_turn_rad = float(np.angle(complex(jacobian[0, 0, 0], jacobian[0, 1, 0])))
 
-    def solve(self, spots: Spots) -> StarFix | NoFix:
+    def solve(self, spots: Spots) -> PictureFix | NoFix:
         """Give the pose at the exposure, or say why there is none."""
         n = len(spots)
         if n < MIN_CLUSTER + 1:
@@ -81,7 +81,9 @@ class PublishedTracker:
         found = self._tree.query_ball_point(angles, ANGLE_TOLERANCE_RAD, p=np.inf)
         return [list(each) for each in np.asarray(found, dtype=object)]
 
-    def _fix(self, matrix: Array, centre: Array, spot: NDArray[np.int64], star: NDArray[np.int64]) -> StarFix:
+    def _fix(
+        self, matrix: Array, centre: Array, spot: NDArray[np.int64], star: NDArray[np.int64]
+    ) -> PictureFix:
         place = np.median(centre, axis=0)
         turns = (matrix[:, 0, 0] + matrix[:, 1, 1]) + 1j * (matrix[:, 1, 0] - matrix[:, 0, 1])
         middle = complex(np.sum(turns / np.abs(turns)))
@@ -94,15 +96,15 @@ class PublishedTracker:
         maps, stars = len(centre), len(np.unique(star))
         mixed = (maps - 1 + MIN_CLUSTER) * stars
         passed_m2 = (0.25 * CLUSTER_RADIUS_M) ** 2
-        cov = np.zeros((3, 3))
-        cov[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
-        cov[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
+        covariance = np.zeros((3, 3))
+        covariance[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
+        covariance[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
         star, first = np.unique(star, return_index=True)
-        return StarFix(
+        return PictureFix(
             x_m=float(origin.real),
             y_m=float(origin.imag),
             heading_rad=float(np.angle(turn)),
-            cov=cov,
+            covariance=covariance,
             stars=len(star),
             mode=Mode.PUBLISHED,
             spot_index=spot[first],

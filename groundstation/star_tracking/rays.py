@@ -33,11 +33,11 @@ class CeilingPoints:
     jacobian_m_px: NDArray[np.float64]
 
 
-def spot_covariance(points: CeilingPoints, cov_px2: NDArray[np.float64]) -> NDArray[np.float64]:
+def spot_covariance(points: CeilingPoints, covariance_px2: NDArray[np.float64]) -> NDArray[np.float64]:
     """Carry pixel covariances (n, 3: uu, uv, vv) to the ceiling, shape (n, 2, 2), m^2."""
-    pixel = np.empty((len(cov_px2), 2, 2))
-    pixel[:, 0, 0], pixel[:, 1, 1] = cov_px2[:, 0], cov_px2[:, 2]
-    pixel[:, 0, 1] = pixel[:, 1, 0] = cov_px2[:, 1]
+    pixel = np.empty((len(covariance_px2), 2, 2))
+    pixel[:, 0, 0], pixel[:, 1, 1] = covariance_px2[:, 0], covariance_px2[:, 2]
+    pixel[:, 0, 1] = pixel[:, 1, 0] = covariance_px2[:, 1]
     jacobian = points.jacobian_m_px
     return np.asarray(jacobian @ pixel @ jacobian.transpose(0, 2, 1))
 

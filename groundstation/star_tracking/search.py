@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.core.library import default_core
-from groundstation.star_tracking import settings as constants
+from groundstation.star_tracking import tracker_settings as constants
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, PictureFix, PoseGuess, PosePrior
 from groundstation.star_tracking.rays import CeilingRays
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 
 _ROOM = 128  # spots to begin with; more come seldom
 
@@ -38,7 +38,7 @@ class Found:
         is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
     """
 
-    fix: StarFix | None
+    fix: PictureFix | None
     best_nats: float
     best_guess: PoseGuess | None
     is_ambiguous: bool = False
@@ -69,8 +69,9 @@ class Search:
         self._sky = self._sky_of(sky, is_dropped)
         self._settings = self._settings_of(settings)
         self._picture = picture = self._ffi.new("StarPicture *")
-        self._cov, self._prior_cov = (
-            np.frombuffer(self._ffi.buffer(field)).reshape(3, 3) for field in (picture.cov, picture.prior_cov)
+        self._covariance, self._prior_covariance = (
+            np.frombuffer(self._ffi.buffer(field)).reshape(3, 3)
+            for field in (picture.covariance, picture.prior_covariance)
         )
         self._make_room(_ROOM)
 
@@ -87,26 +88,26 @@ class Search:
             self._make_room(2 * n)
         picture.spots = n
         self._u_px[:n], self._v_px[:n] = spots.u_px, spots.v_px
-        self._cov_px2[:n], self._streak_px[:n] = spots.cov_px2, spots.streak_px
+        self._covariance_px2[:n], self._streak_px[:n] = spots.covariance_px2, spots.streak_px
         picture.has_prior = prior is not None
         if prior is not None:
             picture.prior_x_m, picture.prior_y_m = prior.x_table_m, prior.y_table_m
             picture.prior_heading_rad = prior.heading_rad
-            self._prior_cov[:] = prior.cov
+            self._prior_covariance[:] = prior.covariance
         picture.has_motion = motion is not None
         if motion is not None:
             picture.vx_table_m_s, picture.vy_table_m_s = motion.vx_table_m_s, motion.vy_table_m_s
-            picture.omega_rad_s = motion.omega_rad_s
+            picture.rate_rad_s = motion.rate_rad_s
         self._lib.gs_star_solve(self._sky, self._rays, self._settings, picture)
         if not picture.is_fix:
             guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
             return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
         stars = picture.stars
-        fix = StarFix(
+        fix = PictureFix(
             x_m=picture.x_m,
             y_m=picture.y_m,
             heading_rad=picture.heading_rad,
-            cov=self._cov.copy(),
+            covariance=self._covariance.copy(),
             stars=stars,
             mode=Mode.TRACKING if picture.is_tracked else Mode.LOST_IN_SPACE,
             spot_index=self._spot_index[:stars].astype(np.int64),
@@ -120,13 +121,13 @@ class Search:
         """Allocate buffers for pictures of so many spots."""
         self._room = spots
         self._u_px, self._v_px = np.zeros(spots), np.zeros(spots)
-        self._cov_px2, self._streak_px = np.zeros((spots, 3)), np.zeros((spots, 2))
+        self._covariance_px2, self._streak_px = np.zeros((spots, 3)), np.zeros((spots, 2))
         self._spot_index, self._star_index = np.zeros(spots, np.int32), np.zeros(spots, np.int32)
         self._residual_m = np.zeros((spots, 2))
         view, new = self._ffi.from_buffer, self._ffi.new
         buffers = {
             **{name: view("double[]", getattr(self, f"_{name}")) for name in ("u_px", "v_px")},
-            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("cov_px2", "streak_px")},
+            **{name: view("double[]", getattr(self, f"_{name}")) for name in ("covariance_px2", "streak_px")},
             **{name: view("int32_t[]", getattr(self, f"_{name}")) for name in ("spot_index", "star_index")},
             "residual_m": view("Point[]", self._residual_m),
             "doubles": new("double[]", self._lib.gs_star_doubles(spots)),

@@ -24,7 +24,7 @@ class SkyChange:
         star: Id of the catalogue; empty for a light that is none of its stars.
         x_m: Where it is seen now (or was last), table.
         y_m: Where it is seen now (or was last), table.
-        cov_m2: Covariance of that place: xx, xy, yy.
+        covariance_m2: Covariance of that place: xx, xy, yy.
         sightings: How many sightings (of a dead star: misses) speak for it.
     """
 
@@ -32,7 +32,7 @@ class SkyChange:
     star: str
     x_m: float
     y_m: float
-    cov_m2: tuple[float, float, float]
+    covariance_m2: tuple[float, float, float]
     sightings: int
 
 
@@ -56,7 +56,7 @@ class Place:
         self._xy += 0.5 * (before.real * after.imag + before.imag * after.real)
         self._yy += before.imag * after.imag
 
-    def cov_m2(self, systematic_m2: float) -> tuple[float, float, float]:
+    def covariance_m2(self, systematic_m2: float) -> tuple[float, float, float]:
         """Covariance of the mean: what sightings scatter, averaged, plus what does not average out."""
         count = max(self.sightings * (self.sightings - 1), 1)
         return self._xx / count + systematic_m2, self._xy / count, self._yy / count + systematic_m2

@@ -76,7 +76,7 @@ class SkyIndex:
             catalogue.x_m + 1j * catalogue.y_m, np.inf
         )  # the last is the star that is none
         self.position_m = self.padded_m[:-1]
-        self.variance_m2 = catalogue.std_m**2
+        self.variance_m2 = catalogue.sigma_m**2
         self.tolerance_m = tolerance_m
         points = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
         tree = cKDTree(points)

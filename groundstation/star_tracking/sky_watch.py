@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import CeilingRays, spot_covariance
 from groundstation.star_tracking.sky_change import Change, Place, SkyChange
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -116,7 +116,7 @@ class SkyWatch:
         rows[list(self._moved)] = True
         return np.flatnonzero(rows)
 
-    def note(self, fix: StarFix, spots: Spots) -> list[SkyChange]:
+    def note(self, fix: PictureFix, spots: Spots) -> list[SkyChange]:
         """Learn from one fix and its spots; give what is newly found."""
         if fix.stars < self._settings.min_stars or len(spots) == 0:
             return []
@@ -132,9 +132,12 @@ class SkyWatch:
             off, star = self._tree.query(where[others].view(np.float64).reshape(-1, 2))
             nearest[others] = star
             mine[others] = np.asarray(off) < self._gate_m[nearest[others]]
-        cov = spot_covariance(points, spots.cov_px2)
+        covariance = spot_covariance(points, spots.covariance_px2)
         arm2 = np.abs(points.q_body_m) ** 2
-        variance = 0.5 * (cov[:, 0, 0] + cov[:, 1, 1] + fix.cov[0, 0] + fix.cov[1, 1]) + arm2 * fix.cov[2, 2]
+        variance = (
+            0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1] + fix.covariance[0, 0] + fix.covariance[1, 1])
+            + arm2 * fix.covariance[2, 2]
+        )
         star = nearest[mine]
         shown = self._shows(fix, np.concatenate((self._star, self._strays.places_m)))
         count = len(self._star)
@@ -161,8 +164,8 @@ class SkyWatch:
     def _watch_places(self, where: Complex, star: Index, sigma_m: NDArray[np.float64]) -> list[SkyChange]:
         settings = self._settings
         error = where - self._star[star]
-        std = np.hypot(sigma_m, self._catalogue.std_m[star])
-        limit = np.maximum(settings.moved_m, settings.moved_sigmas * std)
+        sigma = np.hypot(sigma_m, self._catalogue.sigma_m[star])
+        limit = np.maximum(settings.moved_m, settings.moved_sigmas * sigma)
         is_off = np.abs(error) > limit
         at_home = star
         if is_off.any():
@@ -188,9 +191,11 @@ class SkyWatch:
             is_news = told is None or abs(place.mean - told) > gate
             if is_news and place.sightings >= settings.moved_sightings:
                 self._moved[row] = place.mean
-                name, cov = self._catalogue.ids[row], place.cov_m2(self._systematic_m2())
+                name, covariance = self._catalogue.ids[row], place.covariance_m2(self._systematic_m2())
                 found.append(
-                    SkyChange(Change.MOVED, name, place.mean.real, place.mean.imag, cov, place.sightings)
+                    SkyChange(
+                        Change.MOVED, name, place.mean.real, place.mean.imag, covariance, place.sightings
+                    )
                 )
         return found
 
@@ -210,19 +215,19 @@ class SkyWatch:
         floor = (_CENTRE_FLOOR_PX * self._rays.scale_m_px) ** 2
         known = self._weight > _SETTLED_SIGHTINGS
         if int(known.sum()) < self._settings.min_stars:
-            return floor + float(np.median(self._catalogue.std_m)) ** 2
+            return floor + float(np.median(self._catalogue.sigma_m)) ** 2
         spread = 0.5 * float(np.mean(np.abs(self._offset[known]) ** 2))
         noise = 0.5 * float(np.mean(self._square[known] / self._weight[known]))
         return floor + max(spread - noise, 0.0)
 
-    def _shows(self, fix: StarFix, places: Complex) -> NDArray[np.bool_]:
+    def _shows(self, fix: PictureFix, places: Complex) -> NDArray[np.bool_]:
         """Tell which places of the ceiling lie well inside the picture."""
         turn_back = complex(math.cos(fix.heading_rad), -math.sin(fix.heading_rad))
         return self._view.shows(turn_back * (places - complex(fix.x_m, fix.y_m)))
 
     def _at_home(self, change: Change, row: int, sightings: int) -> SkyChange:
         x, y = self._star_m[row]
-        variance = float(self._catalogue.std_m[row]) ** 2
+        variance = float(self._catalogue.sigma_m[row]) ** 2
         return SkyChange(
             change, self._catalogue.ids[row], float(x), float(y), (variance, 0.0, variance), sightings
         )

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.files.errors import FileError
+from groundstation.files.number_tables import parse_table
 from groundstation.files.reading import read_bytes
-from groundstation.files.tables import parse_table
 
 MIN_STARS = 4
 """Below this no frame could be identified without a prior."""
@@ -25,23 +25,23 @@ class StarCatalogue:
         ids: Names of the stars as written in the file.
         x_m: Positions, shape (n,), m.
         y_m: Positions, shape (n,), m.
-        std_m: Standard deviation per axis, shape (n,), m; 0 where the file does not say.
+        sigma_m: Standard deviation per axis, shape (n,), m; 0 where the file does not say.
     """
 
     ids: tuple[str, ...]
     x_m: NDArray[np.float64]
     y_m: NDArray[np.float64]
-    std_m: NDArray[np.float64]
+    sigma_m: NDArray[np.float64]
 
     def __post_init__(self) -> None:
         n = len(self.ids)
-        if self.x_m.shape != (n,) or self.y_m.shape != (n,) or self.std_m.shape != (n,):
-            raise ValueError("ids, x_m, y_m and std_m must have one entry per star")
+        if self.x_m.shape != (n,) or self.y_m.shape != (n,) or self.sigma_m.shape != (n,):
+            raise ValueError("ids, x_m, y_m and sigma_m must have one entry per star")
         if n < MIN_STARS:
             raise ValueError(f"a catalogue needs at least {MIN_STARS} stars, this one has {n}")
         if not (np.isfinite(self.x_m).all() and np.isfinite(self.y_m).all()):
             raise ValueError("a star's position is not a finite number")
-        if not (np.isfinite(self.std_m).all() and (self.std_m >= 0.0).all()):
+        if not (np.isfinite(self.sigma_m).all() and (self.sigma_m >= 0.0).all()):
             raise ValueError("a star's standard deviation is not a number of zero or more")
         seen: set[str] = set()
         for name in self.ids:
@@ -84,10 +84,10 @@ class StarCatalogue:
         """
         table = parse_table(data, path, (*_PLACE, *_SPREAD), ("id",), optional=_SPREAD, unique=("id",))
         x_m, y_m, *spread = (column.copy() for column in table.numbers.T)
-        given = [std for std in spread if not np.isnan(std).all()]
-        std_m = np.sqrt(np.mean(np.square(given), axis=0)) if given else np.zeros(len(x_m))
+        given = [sigma for sigma in spread if not np.isnan(sigma).all()]
+        sigma_m = np.sqrt(np.mean(np.square(given), axis=0)) if given else np.zeros(len(x_m))
         try:
-            return cls(tuple(table.words["id"]), x_m, y_m, std_m)
+            return cls(tuple(table.words["id"]), x_m, y_m, sigma_m)
         except ValueError as error:
             raise FileError(f"{path}: {error}.") from error
 

@@ -111,4 +111,4 @@ class StrayLights:
 
 def _say(change: Change, place: Place, systematic_m2: float) -> SkyChange:
     at = place.mean
-    return SkyChange(change, "", at.real, at.imag, place.cov_m2(systematic_m2), place.sightings)
+    return SkyChange(change, "", at.real, at.imag, place.covariance_m2(systematic_m2), place.sightings)

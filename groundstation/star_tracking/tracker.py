@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.search import Found, Search
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.star_catalogue import StarCatalogue
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 
 __all__ = ["StarTracker", "TrackerSettings"]
 
@@ -42,7 +42,7 @@ class StarTracker:
         self.catalogue = catalogue
         self.rays = CeilingRays(camera)
         tolerance_m = self.settings.tolerance_px * self.rays.scale_m_px
-        tolerance_m += 2.0 * float(np.median(catalogue.std_m))
+        tolerance_m += 2.0 * float(np.median(catalogue.sigma_m))
         self.sky = SkyIndex(catalogue, tolerance_m, self.rays.reach_m)
         self._is_dropped = np.zeros(len(catalogue) + 1, dtype=bool)  # one more: the star that is none
         self._search = Search(self.sky, self.rays, self.settings, self._is_dropped)
@@ -54,7 +54,7 @@ class StarTracker:
 
     def solve(
         self, spots: Spots, prior: PosePrior | None = None, motion: BodyMotion | None = None
-    ) -> StarFix | NoFix:
+    ) -> PictureFix | NoFix:
         """Give the pose at the exposure, or say why there is none.
 
         Args:
@@ -78,7 +78,7 @@ class StarTracker:
             return NoFix(Refusal.BLURRED, f"{n} spots, most of them streaks.", n)
         if motion is not None and self.settings.exposure_s > 0.0:
             path_m = math.hypot(motion.vx_table_m_s, motion.vy_table_m_s)
-            path_m += 0.5 * self.rays.reach_m * abs(motion.omega_rad_s)
+            path_m += 0.5 * self.rays.reach_m * abs(motion.rate_rad_s)
             streak_px = path_m * self.settings.exposure_s / self.rays.scale_m_px
             if streak_px > _LONG_STREAK_PX:
                 return NoFix(Refusal.BLURRED, f"{n} spots; stars are streaks of {streak_px:.0f} px.", n)

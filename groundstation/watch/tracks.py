@@ -70,7 +70,7 @@ class TrackBuilder:
                 self._truth.append((t_s, *message.position_table_m, message.heading_rad))
             case VehicleState():
                 pose = (*message.position_table_m, message.heading_rad)
-                self._state.append((t_s, *pose, *message.pose_std))
+                self._state.append((t_s, *pose, *message.pose_sigma))
             case ControlStatus():
                 self._goal.append((t_s, *message.goal_position_table_m, message.goal_heading_rad))
             case ValveCommand():

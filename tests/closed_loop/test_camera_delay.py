@@ -41,9 +41,9 @@ def fly_and_measure(groundstation, folder, heading_deg, delay_s, seed):
 def test_the_delay_of_a_flight_is_found_and_read_by_the_next_rig(tmp_path, groundstation):
     call, out = fly_and_measure(groundstation, tmp_path, 45.0, 0.055, 3)
     found = read_delay(out)
-    std_s = tomllib.loads(out.read_text())["delay"]["std"]
-    assert math.isclose(found.delay_s, 0.055, abs_tol=3.0 * std_s)
-    assert std_s < 1e-3
+    sigma_s = tomllib.loads(out.read_text())["delay"]["std"]
+    assert math.isclose(found.delay_s, 0.055, abs_tol=3.0 * sigma_s)
+    assert sigma_s < 1e-3
     assert found.sigma_s < 3e-3
     text, rig_path = rig_of(45.0, 0.055), tmp_path / "rig.toml"
     measured = text.replace("delay_s = 0.015\ndelay_sigma_s = 0.001", 'delay_file = "delay.toml"', 1)

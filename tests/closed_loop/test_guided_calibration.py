@@ -30,5 +30,5 @@ def test_the_sequence_ends_with_enough_data_and_the_emulators_constants(fly):
     found = guide.outcome().quantities
     true = {"gyro_scale": 1.0 - 1.0 / (1.0 + SCALE_ERROR), "lever_x": 0.03151, "lever_y": -0.02122}
     for name, value in true.items():
-        assert abs(found[name].value - value) < 4.0 * found[name].std, name
-    assert found["gyro_scale"].std < 2e-3
+        assert abs(found[name].value - value) < 4.0 * found[name].sigma, name
+    assert found["gyro_scale"].sigma < 2e-3

@@ -26,7 +26,7 @@ def errors(flight, start_s):
         age_s = (true.stamp_ns - state.stamp_ns) * 1e-9
         x, y = (p + v * age_s for p, v in zip(state.position_table_m, state.velocity_table_m_s, strict=True))
         turn = wrap_angle(state.heading_rad + state.rate_rad_s * age_s - true.heading_rad)
-        rows.append((x - true.position_table_m[0], y - true.position_table_m[1], turn, *state.pose_std))
+        rows.append((x - true.position_table_m[0], y - true.position_table_m[1], turn, *state.pose_sigma))
     return np.array(rows)
 
 

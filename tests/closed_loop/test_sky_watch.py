@@ -67,7 +67,7 @@ def test_stars_that_die_move_and_appear_are_named_while_flying_and_come_back(fly
     new = first["appeared", ""]
     assert math.hypot(new.x_m - NEW_M[0], new.y_m - NEW_M[1]) < 3e-4
     assert new.sightings == 25
-    assert 0.0 < new.place_cov[0] < 1e-7
+    assert 0.0 < new.place_covariance[0] < 1e-7
     assert all(fix.fix for fix in flight.of(StarFix))
     mode_of = {fix.mode for fix in flight.of(StarFix, start_s=5.0)}
     assert mode_of == {"tracking", "lost-in-space"}
@@ -92,7 +92,7 @@ def test_what_the_watchdog_found_is_applied_to_the_star_list(tmp_path, groundsta
     row = after.ids.index(moved[1])
     assert math.hypot(after.x_m[row] - moved[2] - SHIFT_M[0], after.y_m[row] - moved[3] - SHIFT_M[1]) < 3e-4
     assert math.hypot(after.x_m[-1] - NEW_M[0], after.y_m[-1] - NEW_M[1]) < 3e-4
-    assert 0.0 < after.std_m[-1] < 3e-4
+    assert 0.0 < after.sigma_m[-1] < 3e-4
     assert after.ids[-1] not in before.ids
     written = out.with_suffix(".toml").read_text()
     assert f'struck = ["{dead[1]}"]' in written

@@ -29,9 +29,9 @@ def true_map(rig, seed, path):
     surface = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed).surface
     x, y = np.arange(-2.0, 2.01, 0.05), np.arange(-1.5, 1.51, 0.05)
     pull = np.array([[surface.slope_acceleration(a, b) for a in x] for b in y])
-    std, mean = np.full(pull.shape[:2], 5e-5), pull.reshape(-1, 2).mean(axis=0)
+    sigma, mean = np.full(pull.shape[:2], 5e-5), pull.reshape(-1, 2).mean(axis=0)
     made = TableMap(
-        -2.0, -1.5, 0.05, pull[..., 0], pull[..., 1], std, std, np.zeros_like(std),
+        -2.0, -1.5, 0.05, pull[..., 0], pull[..., 1], sigma, sigma, np.zeros_like(sigma),
         (float(mean[0]), float(mean[1])), 1e-9 * np.eye(2), 3e-4,
         MapProvenance(datetime(2026, 1, 1, tzinfo=UTC), {"truth": "0" * 64}, 1.0, 1.0),
     )  # fmt: skip

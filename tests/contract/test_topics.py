@@ -37,10 +37,12 @@ INTEGERS = {
 }
 LATEST_NS = 2**31 * 10**9 - 1  # the seconds of a ROS 2 stamp are an int32
 
-UNIT = re.compile(r"_(s|ms|ns|m|m_s|m_s2|rad|rad_s|rad_s2|kg|n|nm|pa|c|k|px|px2|dn|hz|ratio|counts|std|cov)$")
-# what has no unit, or one per element which its docstring names (so do _std and _cov)
+UNIT = re.compile(
+    r"_(s|ms|ns|m|m_s|m_s2|rad|rad_s|rad_s2|kg|n|nm|pa|c|k|px|px2|dn|hz|ratio|counts|sigma|covariance)$"
+)
+# what has no unit, or one per element which its docstring names (so do _sigma and _covariance)
 WITHOUT_UNIT = {
-    "elongation", "covariance", "std", "innovation", "difference", "mean_difference", "nis", "mean_nis",
+    "elongation", "covariance", "sigma", "innovation", "difference", "mean_difference", "nis", "mean_nis",
     "quaternion_xyzw",
 }  # fmt: skip
 

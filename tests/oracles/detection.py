@@ -46,7 +46,7 @@ def _find(image: NDArray[np.uint8], settings: DetectorSettings) -> Spots:
         u_px=fitted.u_px[order],
         v_px=fitted.v_px[order],
         flux_dn=fitted.flux_dn[order],
-        cov_px2=fitted.cov_px2[order],
+        covariance_px2=fitted.covariance_px2[order],
         elongation=fitted.elongation[order],
         streak_px=fitted.streak_px[order],
         background_dn=levels.background_dn,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.settings import SIGMAS_PX, STRAY_RATIO
+from groundstation.star_tracking.tracker_settings import SIGMAS_PX, STRAY_RATIO
 
 
 @dataclass(frozen=True, slots=True)

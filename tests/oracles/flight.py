@@ -74,7 +74,7 @@ def fly(x: Array, segment: Segment, lag_difference_s: float, table_map: SlopeGri
     """
     dt = segment.span_s
     warmth = segment.warmth_k
-    w = (segment.omega_rad_s - x[GYRO_BIAS] - x[GYRO_TEMPCO] * warmth) * (1.0 - x[GYRO_SCALE])
+    w = (segment.rate_rad_s - x[GYRO_BIAS] - x[GYRO_TEMPCO] * warmth) * (1.0 - x[GYRO_SCALE])
     step = w * dt
     after = np.cumsum(step)
     turned = after - 0.5 * step
@@ -172,7 +172,7 @@ def moving_noise(segment: Segment, flight: Flight, noise: NoiseModel) -> Array:
         vv += knocked
         vp += knocked * left
         pp += knocked * left**2
-        Q[THETA, THETA] += float(segment.omega_rad_s[near].var()) * span**2
+        Q[THETA, THETA] += float(segment.rate_rad_s[near].var()) * span**2
     Q[VX, VX] = Q[VY, VY] = vv
     Q[VX, PX] = Q[PX, VX] = Q[VY, PY] = Q[PY, VY] = vp
     Q[PX, PX] = Q[PY, PY] = pp

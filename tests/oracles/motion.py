@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.fixes import BodyMotion
-from groundstation.star_tracking.settings import (
+from groundstation.star_tracking.tracker_settings import (
     MAX_MISFIT_RATIO,
     MIN_STREAK_PX,
     MIN_STREAK_SHARE,
@@ -40,7 +40,7 @@ class Smear:
 def smear_from_motion(motion: BodyMotion, exposure_s: float, turn: complex) -> Smear:
     """Give the smear of a known motion; ``turn`` is exp(i heading)."""
     velocity = complex(motion.vx_table_m_s, motion.vy_table_m_s) * np.conj(turn)
-    return Smear(motion.omega_rad_s * exposure_s, complex(velocity * exposure_s))
+    return Smear(motion.rate_rad_s * exposure_s, complex(velocity * exposure_s))
 
 
 def smear_from_streaks(q_body_m: Complex, streak_px: Array, jacobian_m_px: Array) -> Smear | None:
@@ -75,7 +75,7 @@ def row_delays_s(v_px: Array, rows: int, readout_s: float) -> Array:
 def to_middle_row(q_body_m: Complex, delay_s: Array, motion: BodyMotion, turn: complex) -> Complex:
     """Bring spots of a rolling shutter to where the middle row would have seen them."""
     velocity = complex(motion.vx_table_m_s, motion.vy_table_m_s) * np.conj(turn)
-    turned = q_body_m * np.exp(1j * motion.omega_rad_s * delay_s)
+    turned = q_body_m * np.exp(1j * motion.rate_rad_s * delay_s)
     return np.asarray(turned + velocity * delay_s, dtype=np.complex128)
 
 

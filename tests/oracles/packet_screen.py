@@ -26,39 +26,39 @@ class PacketScreen:
         """Believe the next packet whatever it is."""
         self._last = self._suspect = None
 
-    def is_wild(self, omega: float, ax: float, ay: float) -> bool:
+    def is_wild(self, rate_rad_s: float, ax: float, ay: float) -> bool:
         """Return whether the packet shall not be integrated; NaN and infinity are wild."""
         last = self._last
         if last is None:
-            if self._is_beyond_scale(omega, ax, ay):
+            if self._is_beyond_scale(rate_rad_s, ax, ay):
                 return True
-            self._last = (omega, ax, ay)
+            self._last = (rate_rad_s, ax, ay)
             return False
         rate, force = self.max_rate_step, self.max_acc_step
         if (
-            -rate <= omega - last[0] <= rate
+            -rate <= rate_rad_s - last[0] <= rate
             and -force <= ax - last[1] <= force
             and -force <= ay - last[2] <= force
         ):
-            self._last = (omega, ax, ay)
+            self._last = (rate_rad_s, ax, ay)
             self._suspect = None
             return False
         suspect = self._suspect
-        if self._is_beyond_scale(omega, ax, ay):
+        if self._is_beyond_scale(rate_rad_s, ax, ay):
             return True
         if (
             suspect is not None
-            and -rate <= omega - suspect[0] <= rate
+            and -rate <= rate_rad_s - suspect[0] <= rate
             and -force <= ax - suspect[1] <= force
             and -force <= ay - suspect[2] <= force
         ):
-            self._last = (omega, ax, ay)
+            self._last = (rate_rad_s, ax, ay)
             self._suspect = None
             return False
-        self._suspect = (omega, ax, ay)
+        self._suspect = (rate_rad_s, ax, ay)
         return True
 
-    def _is_beyond_scale(self, omega: float, ax: float, ay: float) -> bool:
+    def _is_beyond_scale(self, rate_rad_s: float, ax: float, ay: float) -> bool:
         """Whether no sensor can have read this; NaN and infinity among it."""
         rate, force = self._full_rate, self._full_acc
-        return not (-rate <= omega <= rate and -force <= ax <= force and -force <= ay <= force)
+        return not (-rate <= rate_rad_s <= rate and -force <= ax <= force and -force <= ay <= force)

@@ -31,10 +31,10 @@ class OracleReckoner:
     __slots__ = (
         "_acc_lag", "_ax", "_ay", "_backward", "_bax", "_bay", "_bg", "_counters",
         "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
-        "_mxx", "_mxy", "_myx", "_myy", "_omega_read", "_period", "_px", "_py", "_reference_c",
+        "_mxx", "_mxy", "_myx", "_myy", "_period", "_px", "_py", "_rate_read", "_reference_c",
         "_rx", "_ry", "_screen", "_slope_x", "_slope_y", "_temperature_c", "_theta", "_until_lookup",
         "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "has_pose", "history", "is_lost", "newest_ns",
-        "newest_s", "omega_rad_s", "origin_ns", "rest_from_s", "rest_to_s", "variance",
+        "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
@@ -56,8 +56,8 @@ class OracleReckoner:
         self.checkpoint_s = 0.0
         self.variance = [0.0] * 13
         """Of x, y (five coefficients each) and heading (three) in time since the checkpoint."""
-        self.omega_rad_s = 0.0
-        self._omega_read = self._ax = self._ay = 0.0
+        self.rate_rad_s = 0.0
+        self._rate_read = self._ax = self._ay = 0.0
         self._force_x = self._force_y = 0.0
         self._backward = BackwardStamps()
         self._warmth = 0.0
@@ -86,7 +86,7 @@ class OracleReckoner:
 
     def add(self, packet: ImuPacket) -> bool:
         """Take one packet; False when its stamp is not after the last one's."""
-        t_ns, dt, omega, ax, ay, temperature_c = packet
+        t_ns, dt, rate, ax, ay, temperature_c = packet
         if self.origin_ns is None:
             self.start_clock(t_ns - round(dt * 1e9))
         elif t_ns <= self.newest_ns and not self._clock_restarted(t_ns):
@@ -107,9 +107,9 @@ class OracleReckoner:
         if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
             self._warm(temperature_c)
         hole = 0.0
-        if self._screen.is_wild(omega, ax, ay):
+        if self._screen.is_wild(rate, ax, ay):
             self._counters.add("packet_wild")
-            omega, ax, ay, hole = self._omega_read, self._ax, self._ay, 1.0
+            rate, ax, ay, hole = self._rate_read, self._ax, self._ay, 1.0
         if dt > 1.5 * self._period:
             self._counters.add("packet_hole")
             gap = dt - self._period
@@ -117,13 +117,13 @@ class OracleReckoner:
             self._advance(
                 t - dt,
                 gap,
-                0.5 * (omega + self._omega_read),
+                0.5 * (rate + self._rate_read),
                 0.5 * (ax + self._ax),
                 0.5 * (ay + self._ay),
                 1.0,
             )
-        self._omega_read, self._ax, self._ay = omega, ax, ay
-        self._advance(t, dt, omega, ax, ay, hole)
+        self._rate_read, self._ax, self._ay = rate, ax, ay
+        self._advance(t, dt, rate, ax, ay, hole)
         if self._map is not None:
             self._until_lookup -= 1
             if self._until_lookup < 0:
@@ -142,12 +142,12 @@ class OracleReckoner:
         self._screen.forget()
         return True
 
-    def _advance(self, t: float, dt: float, omega: float, ax: float, ay: float, hole: float) -> None:
+    def _advance(self, t: float, dt: float, rate: float, ax: float, ay: float, hole: float) -> None:
         """Store one stretch of constant readings and integrate it."""
-        self.history.rows.extend((t, dt, omega, ax, ay, self._warmth, hole))
+        self.history.rows.extend((t, dt, rate, ax, ay, self._warmth, hole))
         if self.rest_from_s <= t <= self.rest_to_s or not self.has_pose:
             return
-        w = (omega - self._bg) * self._gyro_gain
+        w = (rate - self._bg) * self._gyro_gain
         ux = ax - self._bax
         uy = ay - self._bay
         fx = self._mxx * ux - self._mxy * uy
@@ -164,11 +164,11 @@ class OracleReckoner:
         self._vx = vx + ax * dt
         self._vy = vy + ay * dt
         self._theta += turn
-        self.omega_rad_s = w
+        self.rate_rad_s = w
 
     def report(self) -> PlanarState:
         """Return the state of the centre of mass now: sensor lag undone, lever arm taken off."""
-        w = self.omega_rad_s
+        w = self.rate_rad_s
         # the stamp of the row jitters about the tick that the state holds at
         off = (self.newest_ns - (self.origin_ns or 0)) * 1e-9 - self.newest_s
         theta = self._theta + (self._gyro_lag + off) * w
@@ -210,9 +210,9 @@ class OracleReckoner:
         self._theta, self._vx, self._vy, self._px, self._py = moved.tolist()
         self._unpack()
         if self.rest_from_s <= self.newest_s <= self.rest_to_s:
-            self.omega_rad_s = self._force_x = self._force_y = 0.0
+            self.rate_rad_s = self._force_x = self._force_y = 0.0
         else:
-            self.omega_rad_s = (self._omega_read - self._bg) * self._gyro_gain
+            self.rate_rad_s = (self._rate_read - self._bg) * self._gyro_gain
 
     def _warm(self, temperature_c: float) -> None:
         self._temperature_c = temperature_c

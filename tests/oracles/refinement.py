@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.star_tracking.settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
+from groundstation.star_tracking.tracker_settings import CLIP_SIGMAS, PRIOR_FREEDOM, REFINE_STEPS
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
@@ -24,30 +24,30 @@ class Pose:
     Attributes:
         turn: exp(i heading).
         shift_m: Body origin x + iy in the table.
-        cov: Covariance (3, 3) of (x, y, heading), table axes.
+        covariance: Covariance (3, 3) of (x, y, heading), table axes.
         kept: Which of the matches were used, shape (n,).
         scale: Ratio of found to expected residuals (sigma, not variance).
     """
 
     turn: complex
     shift_m: complex
-    cov: Array
+    covariance: Array
     kept: NDArray[np.bool_]
     scale: float
 
 
-def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shift_m: complex) -> Pose:
+def refine(q_body_m: Complex, star_m: Complex, covariance_m2: Array, turn: complex, shift_m: complex) -> Pose:
     """Fit the pose to matches.
 
     Args:
         q_body_m: Spots on the ceiling, body axes, shape (n,).
         star_m: Their stars, table, shape (n,).
-        cov_m2: Covariance of spot minus star, body axes, shape (n, 2, 2).
+        covariance_m2: Covariance of spot minus star, body axes, shape (n, 2, 2).
         turn: First guess, exp(i heading).
         shift_m: First guess of the body origin.
     """
     n = len(q_body_m)
-    weight = _inverse(cov_m2)
+    weight = _inverse(covariance_m2)
     lever = np.zeros((n, 2, 3))
     lever[:, 0, 0] = lever[:, 1, 1] = 1.0
     lever[:, 0, 2], lever[:, 1, 2] = -q_body_m.imag, q_body_m.real
@@ -71,8 +71,10 @@ def refine(q_body_m: Complex, star_m: Complex, cov_m2: Array, turn: complex, shi
     information = _weighted_sum(kept, normal)
     rotation = np.eye(3)
     rotation[:2, :2] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
-    cov = rotation @ (np.linalg.inv(information) * scale2) @ rotation.T
-    return Pose(complex(turn), complex(shift_m), 0.5 * (cov + cov.T), kept > 0.5, float(np.sqrt(scale2)))
+    covariance = rotation @ (np.linalg.inv(information) * scale2) @ rotation.T
+    return Pose(
+        complex(turn), complex(shift_m), 0.5 * (covariance + covariance.T), kept > 0.5, float(np.sqrt(scale2))
+    )
 
 
 def _error(q_body_m: Complex, star_m: Complex, turn: complex, shift_m: complex) -> Array:

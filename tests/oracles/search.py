@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, PictureFix, PosePrior
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays
 from groundstation.star_tracking.search import Found
-from groundstation.star_tracking.settings import NEIGHBOUR_RANKS, RANK_GROUPS, TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
+from groundstation.star_tracking.tracker_settings import NEIGHBOUR_RANKS, RANK_GROUPS, TrackerSettings
 from oracles.hypotheses import Poses, pair_poses, spot_triangles, triangle_poses
 from oracles.motion import smear_from_streaks, unbend
 from oracles.settling import Settler, Sighting
@@ -65,14 +65,14 @@ class OracleSearch:
             fix = self._lost_in_space(sighting)
         return Found(fix, sighting.best_nats, sighting.best_guess, sighting.is_ambiguous)
 
-    def _track(self, sighting: Sighting, prior: PosePrior) -> StarFix | None:
+    def _track(self, sighting: Sighting, prior: PosePrior) -> PictureFix | None:
         turn, shift = np.exp(1j * prior.heading_rad), complex(prior.x_table_m, prior.y_table_m)
-        sigma = math.sqrt(max(prior.cov[0, 0], prior.cov[1, 1]))
-        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.cov[2, 2]))
+        sigma = math.sqrt(max(prior.covariance[0, 0], prior.covariance[1, 1]))
+        sigma = math.hypot(sigma, 0.5 * self._rays.reach_m * math.sqrt(prior.covariance[2, 2]))
         gate = min(3.0 * sigma + 2.0 * self._sky.tolerance_m, 0.1)
         return self._settler.settle(sighting, turn, shift, gate, prior)
 
-    def _lost_in_space(self, sighting: Sighting) -> StarFix | None:
+    def _lost_in_space(self, sighting: Sighting) -> PictureFix | None:
         q = sighting.points.q_body_m[: self._settings.identified_spots]
         if len(q) > self._settings.min_stars:
             for begin, end in pairwise((0, *RANK_GROUPS)):
@@ -95,7 +95,7 @@ class OracleSearch:
                 return fix
         return None
 
-    def _best(self, sighting: Sighting, q: Complex, poses: Poses) -> StarFix | None:
+    def _best(self, sighting: Sighting, q: Complex, poses: Poses) -> PictureFix | None:
         """Test all poses, settle the few that most spots agree with, and look for rivals of a fix.
 
         A ceiling that repeats itself (LEDs in rows and columns) explains a picture in many places: of
@@ -108,7 +108,7 @@ class OracleSearch:
         sighting.look_ups_left -= len(turn) * len(q)
         _, distance = nearest(self._sky, turn[:, None] * q + shift[:, None])
         votes = np.count_nonzero(distance < 2.0 * self._sky.tolerance_m, axis=1)
-        fix: StarFix | None = None
+        fix: PictureFix | None = None
         needed, rival_nats = float(self._settings.min_stars), -math.inf
         for rank, candidate in enumerate(np.argsort(-votes, kind="stable")[:_RIVALS]):
             if votes[candidate] < needed or (fix is None and rank >= _REFINED):
@@ -141,7 +141,7 @@ class OracleSearch:
             return None
         return fix
 
-    def _is_same(self, q: Complex, turn: complex, shift: complex, fix: StarFix) -> bool:
+    def _is_same(self, q: Complex, turn: complex, shift: complex, fix: PictureFix) -> bool:
         """Whether a pose puts the spots about where a fix does: their middle, and the heading."""
         fix_turn, middle = np.exp(1j * fix.heading_rad), q.mean()
         off = abs((turn - fix_turn) * middle + shift - complex(fix.x_m, fix.y_m))

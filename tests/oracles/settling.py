@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, Mode, PoseGuess, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, PictureFix, PoseGuess, PosePrior
 from groundstation.star_tracking.rays import CeilingPoints, CeilingRays, spot_covariance
-from groundstation.star_tracking.settings import TrackerSettings
 from groundstation.star_tracking.sky_index import SkyIndex
+from groundstation.star_tracking.tracker_settings import TrackerSettings
 from oracles.evidence import Chance, evidence_nats
 from oracles.motion import row_delays_s, smear_from_motion, to_middle_row, unbend
 from oracles.refinement import Pose, refine
@@ -63,7 +63,7 @@ class Settler:
 
     def settle(
         self, sighting: Sighting, turn: complex, shift: complex, gate_m: float, prior: PosePrior | None
-    ) -> StarFix | None:
+    ) -> PictureFix | None:
         """Refine a candidate and put it to the test.
 
         Args:
@@ -83,8 +83,8 @@ class Settler:
             spot, star = self._match(q, turn, shift, gate_m)
             if len(spot) < needed:
                 return None
-            cov = self._covariance(spots, points, spot, star)
-            pose = refine(q[spot], self._sky.position_m[star], cov, turn, shift)
+            covariance = self._covariance(spots, points, spot, star)
+            pose = refine(q[spot], self._sky.position_m[star], covariance, turn, shift)
             turn, shift = pose.turn, pose.shift_m
             if gate_m <= 1.5 * tolerance_m:
                 break
@@ -98,11 +98,11 @@ class Settler:
         if not nats >= self._settings.evidence_nats or int(pose.kept.sum()) < needed:
             return None
         kept = pose.kept
-        return StarFix(
+        return PictureFix(
             x_m=shift.real,
             y_m=shift.imag,
             heading_rad=float(np.angle(turn)),
-            cov=pose.cov,
+            covariance=pose.covariance,
             stars=int(kept.sum()),
             mode=Mode.LOST_IN_SPACE if prior is None else Mode.TRACKING,
             spot_index=spot[kept],
@@ -145,11 +145,11 @@ class Settler:
         variance_px2 = self._settings.centre_floor_px**2 + self._settings.streak_floor_ratio**2 * length2
         floor = variance_px2[:, None] * np.array([1.0, 0.0, 1.0])
         chosen = CeilingPoints(points.q_body_m[spot], points.jacobian_m_px[spot])
-        cov = spot_covariance(chosen, spots.cov_px2[spot] + floor)
+        covariance = spot_covariance(chosen, spots.covariance_px2[spot] + floor)
         variance = self._sky.variance_m2[star]
-        cov[:, 0, 0] += variance
-        cov[:, 1, 1] += variance
-        return cov
+        covariance[:, 0, 0] += variance
+        covariance[:, 1, 1] += variance
+        return covariance
 
     def _evidence(
         self, q: Complex, distance: NDArray[np.float64], spots: int, prior: PosePrior | None, pose: Pose
@@ -163,7 +163,7 @@ class Settler:
                     float(np.angle(pose.turn * np.exp(-1j * prior.heading_rad))),
                 ]
             )
-            spread = prior.cov + pose.cov
+            spread = prior.covariance + pose.covariance
             determinant = float(np.linalg.det(spread))
             if not determinant > 0.0:
                 return -math.inf  # a prior that is none

@@ -76,7 +76,7 @@ class FittedSpots:
     u_px: Vector
     v_px: Vector
     flux_dn: Vector
-    cov_px2: Vector
+    covariance_px2: Vector
     elongation: Vector
     streak_px: Vector
 
@@ -90,14 +90,14 @@ def fit_spots(pixels: SpotPixels) -> FittedSpots:
     """
     guess = _moments(pixels)
     shape = _shapes(guess)
-    u, v, flux, cov, trusted = _gauss_newton(pixels, guess, shape)
+    u, v, flux, covariance, trusted = _gauss_newton(pixels, guess, shape)
     half = 0.5 * (shape[0] + shape[2])
     spread = np.hypot(0.5 * (shape[0] - shape[2]), shape[1])
     return FittedSpots(
         u_px=np.where(trusted, u, guess.u_px),
         v_px=np.where(trusted, v, guess.v_px),
         flux_dn=np.where(trusted, flux, guess.flux_dn),
-        cov_px2=np.where(trusted, cov, guess.cov_px2).T.copy(),
+        covariance_px2=np.where(trusted, covariance, guess.covariance_px2).T.copy(),
         elongation=np.sqrt((half + spread) / np.maximum(half - spread, 1e-3)),
         streak_px=_streaks(shape),
     )
@@ -111,7 +111,7 @@ class _Moments:
     u_px: Vector
     v_px: Vector
     spread_px2: Vector
-    cov_px2: Vector
+    covariance_px2: Vector
 
 
 def _moments(pixels: SpotPixels) -> _Moments:
@@ -124,8 +124,8 @@ def _moments(pixels: SpotPixels) -> _Moments:
     square = np.stack((du * du, du * dv, dv * dv))
     variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * np.maximum(light, 0.0)
     spread = np.add.reduceat(light * square, starts, axis=1) / flux
-    cov = np.add.reduceat(variance * square, starts, axis=1) / flux**2
-    return _Moments(flux, u, v, spread, cov)
+    covariance = np.add.reduceat(variance * square, starts, axis=1) / flux**2
+    return _Moments(flux, u, v, spread, covariance)
 
 
 def _shapes(moments: _Moments) -> Vector:
@@ -216,7 +216,7 @@ def _gauss_newton(
     is_line = bool((line.half_px > _LINE_PX).any())
     u, v, flux = guess.u_px.copy(), guess.v_px.copy(), guess.flux_dn.copy()
     usable = ~pixels.is_saturated
-    cov = guess.cov_px2
+    covariance = guess.covariance_px2
     trusted = pixels.size <= _MAX_FIT_PX
     for step in range(_STEPS):
         du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
@@ -253,6 +253,6 @@ def _gauss_newton(
         step_u, step_v = np.where(trusted, step_u, 0.0), np.where(trusted, step_v, 0.0)
         u, v = u + step_u, v + step_v
         flux = flux + np.where(trusted, (g_f - n_uf * step_u - n_vf * step_v) / n_ff, 0.0)
-        cov = np.stack((n_vv, -n_uv, n_uu)) / det
+        covariance = np.stack((n_vv, -n_uv, n_uu)) / det
     trusted &= flux > 0.0
-    return u, v, flux, cov, trusted
+    return u, v, flux, covariance, trusted

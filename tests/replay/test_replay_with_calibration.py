@@ -21,9 +21,9 @@ NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
 
 def write_map(path, pull_m_s2):
     flat = np.ones((7, 9))
-    std = 1e-4 * flat
+    sigma = 1e-4 * flat
     TableMap(
-        -2.0, -1.5, 0.5, pull_m_s2 * flat, -1e-3 * flat, std, std, 0.0 * flat, (pull_m_s2, -1e-3),
+        -2.0, -1.5, 0.5, pull_m_s2 * flat, -1e-3 * flat, sigma, sigma, 0.0 * flat, (pull_m_s2, -1e-3),
         1e-9 * np.eye(2), 1e-3, MapProvenance(NOON, {"laps.mcap": "0" * 64}, 1.0, 300.0),
     ).save(path)  # fmt: skip
 

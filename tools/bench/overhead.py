@@ -12,9 +12,9 @@ from bench.rows import ROOT, Bench, Row
 from bench.unit import blur_s, picture
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
+from groundstation.overhead.circle_tracker import OverheadFix, OverheadTracker
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead.tracker import OverheadFix, OverheadTracker
 
 FILES = ROOT / "calibration" / "rigs" / "emulated"
 KINDS = (("at rest", 0.0, 0, 0.3), ("0.5 m/s, 10 ms", 0.0025, 0, 0.3), ("JPEG 95", 0.0, 95, 0.6))
@@ -76,7 +76,7 @@ def _look(view: TableView, tracker: OverheadTracker, frames: int, half_m: float,
                 off = np.array([answer.x_m, answer.y_m, answer.heading_rad]) - pose
                 off[2] = np.angle(np.exp(1j * off[2]))
                 found.off.append(off)
-                found.ratios.append(float(off @ np.linalg.solve(answer.cov, off)) / 3.0)
+                found.ratios.append(float(off @ np.linalg.solve(answer.covariance, off)) / 3.0)
     return found
 
 

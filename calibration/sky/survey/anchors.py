@@ -5,7 +5,7 @@ from pathlib import Path
 
 from calibration.sky.survey.surveyed_sky import Anchor
 from groundstation.files.errors import FileError
-from groundstation.files.tables import load_table
+from groundstation.files.number_tables import load_table
 
 LEAST = 2
 

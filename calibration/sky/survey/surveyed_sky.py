@@ -36,7 +36,7 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.projection import project
 from groundstation.star_tracking.rays import CeilingRays
 
-__all__ = ["LENS", "Anchor", "SurveyError", "SurveyedSky", "shape_std_m", "survey"]
+__all__ = ["LENS", "Anchor", "SurveyError", "SurveyedSky", "shape_sigma_m", "survey"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -57,10 +57,10 @@ class SurveyedSky:
     Attributes:
         ids: Names; anchors keep theirs, the rest are numbered on.
         star_m: Positions, shape (s, 2), table.
-        std_m: Standard deviations of the shape, shape (s, 2).
+        sigma_m: Standard deviations of the shape, shape (s, 2).
         times_seen: Pictures that each star was used in, shape (s,).
         camera: The camera with the ceiling's height as found.
-        std_height_m: One sigma of that height, the tape's errors not included.
+        sigma_height_m: One sigma of that height, the tape's errors not included.
         pose: Poses of the placed pictures, shape (f, 3).
         placed: Their indices, shape (f,).
         part_sizes: Pictures of each part into which the sweep fell, the largest first; one number if it held.
@@ -72,10 +72,10 @@ class SurveyedSky:
 
     ids: tuple[str, ...]
     star_m: Array
-    std_m: Array
+    sigma_m: Array
     times_seen: Index
     camera: CameraCalibration
-    std_height_m: float
+    sigma_height_m: float
     pose: Array
     placed: Index
     part_sizes: tuple[int, ...]
@@ -90,7 +90,7 @@ def survey(
     anchors: Sequence[Anchor],
     camera: CameraCalibration,
     *,
-    tape_std_m: float = 3e-3,
+    tape_sigma_m: float = 3e-3,
     free: Sequence[str] = HEIGHT,
     progress: Callable[[int, float], None] | None = None,
 ) -> SurveyedSky:
@@ -100,7 +100,7 @@ def survey(
         pictures: Spots of the sweep's pictures, in order.
         anchors: At least two stars measured by tape.
         camera: Intrinsics and mount; its height may be 10 % off.
-        tape_std_m: How well the tape was read.
+        tape_sigma_m: How well the tape was read.
         free: Camera values to adjust besides poses and stars: ``HEIGHT``, or ``LENS`` for the lens too.
         progress: Called with the step's number and the residual RMS in px.
 
@@ -109,9 +109,9 @@ def survey(
     """
     if len(anchors) < 2:
         raise SurveyError(f"a survey needs at least two anchors, there is {len(anchors)}")
-    sky = _survey_once(pictures, anchors, camera, tape_std_m, free, progress)
+    sky = _survey_once(pictures, anchors, camera, tape_sigma_m, free, progress)
     for _ in range(1, 1 if tuple(free) == HEIGHT else _LENS_ROUNDS):
-        sky = _survey_once(pictures, anchors, sky.camera, tape_std_m, free, progress)
+        sky = _survey_once(pictures, anchors, sky.camera, tape_sigma_m, free, progress)
     return sky
 
 
@@ -119,7 +119,7 @@ def _survey_once(
     pictures: Sequence[Spots],
     anchors: Sequence[Anchor],
     camera: CameraCalibration,
-    tape_std_m: float,
+    tape_sigma_m: float,
     free: Sequence[str],
     progress: Callable[[int, float], None] | None,
 ) -> SurveyedSky:
@@ -129,7 +129,7 @@ def _survey_once(
     tape = np.array([[a.x_m, a.y_m] for a in anchors])
     try:
         fit = fit_tape(
-            [a.name for a in anchors], sweep.star_m[named], tape[:, 0] + 1j * tape[:, 1], tape_std_m
+            [a.name for a in anchors], sweep.star_m[named], tape[:, 0] + 1j * tape[:, 1], tape_sigma_m
         )
     except TapeError as error:
         raise SurveyError(str(error)) from error
@@ -142,7 +142,7 @@ def _survey_once(
     stages = [HEIGHT] if tuple(free) == HEIGHT else [HEIGHT, tuple(free)]
     while True:
         seen = _observations(pictures, sweep)
-        known = StarPrior(named, tape, np.full(len(named), tape_std_m))
+        known = StarPrior(named, tape, np.full(len(named), tape_sigma_m))
         try:
             for stage in stages:
                 adjusted = adjust(guess, pose, position, seen, free=stage, known=known, progress=progress)
@@ -164,10 +164,10 @@ def _survey_once(
     return SurveyedSky(
         ids=_ids(anchors, named, len(position)),
         star_m=adjusted.star_m,
-        std_m=shape_std_m(adjusted.star_m, adjusted.cov_star_m2),
+        sigma_m=shape_sigma_m(adjusted.star_m, adjusted.covariance_star_m2),
         times_seen=times_seen,
         camera=adjusted.camera,
-        std_height_m=adjusted.std_camera.get(HEIGHT[0], 0.0),
+        sigma_height_m=adjusted.sigma_camera.get(HEIGHT[0], 0.0),
         pose=adjusted.pose,
         placed=sweep.placed,
         part_sizes=tuple(len(part.placed) for part in parts),
@@ -178,7 +178,7 @@ def _survey_once(
     )
 
 
-def shape_std_m(star_m: Array, cov_m2: Array) -> Array:
+def shape_sigma_m(star_m: Array, covariance_m2: Array) -> Array:
     """Give standard deviations (s, 2) with position, turn and scale of the whole sky taken out.
 
     The covariance is projected off the four directions of a similarity (the inner constraints of a
@@ -191,7 +191,7 @@ def shape_std_m(star_m: Array, cov_m2: Array) -> Array:
     gauge[:, 0, 2], gauge[:, 1, 2] = -centred[:, 1], centred[:, 0]
     gauge[:, :, 3] = centred
     basis, _ = np.linalg.qr(gauge.reshape(2 * n, 4))
-    half = cov_m2 - basis @ (basis.T @ cov_m2)
+    half = covariance_m2 - basis @ (basis.T @ covariance_m2)
     inner = half - (half @ basis) @ basis.T
     return np.asarray(np.sqrt(np.maximum(np.diag(inner), 0.0)).reshape(n, 2))
 
@@ -217,7 +217,7 @@ def _observations(pictures: Sequence[Spots], sweep: LinkedMap) -> Observations:
         mine = sweep.frame == row
         spots, spot = pictures[int(number)], sweep.spot[mine]
         pixel[mine, 0], pixel[mine, 1] = spots.u_px[spot], spots.v_px[spot]
-        variance = 0.5 * (spots.cov_px2[spot, 0] + spots.cov_px2[spot, 2]) + _CENTRE_FLOOR_PX**2
+        variance = 0.5 * (spots.covariance_px2[spot, 0] + spots.covariance_px2[spot, 2]) + _CENTRE_FLOOR_PX**2
         sigma[mine] = np.sqrt(variance)
     return Observations(sweep.frame, sweep.star, pixel, sigma)
 

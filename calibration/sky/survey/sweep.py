@@ -43,7 +43,7 @@ class Survey:
         sky = self.sky
         order = np.argsort(np.asarray(sky.ids, dtype=object), kind="stable")
         return star_list_text(
-            star_row(sky.ids[i], sky.star_m[i], sky.std_m[i], sky.times_seen[i]) for i in order
+            star_row(sky.ids[i], sky.star_m[i], sky.sigma_m[i], sky.times_seen[i]) for i in order
         )
 
 
@@ -53,7 +53,7 @@ def survey_sweep(
     camera: CameraCalibration,
     names: Sequence[str],
     *,
-    tape_std_m: float = 3e-3,
+    tape_sigma_m: float = 3e-3,
     is_lens_free: bool = False,
     verify_every: int = 6,
     progress: Progress = silent,
@@ -68,7 +68,7 @@ def survey_sweep(
         anchors: At least two stars measured by tape, with a click in one picture each.
         camera: Lens and mount; its height may be 10 % off.
         names: Of the pictures, for people.
-        tape_std_m: How well the tape was read, one sigma.
+        tape_sigma_m: How well the tape was read, one sigma.
         is_lens_free: Calibrate lens and tilt from the same pictures.
         verify_every: Every so many pictures are held out; below 2 none are.
         progress: Told how it goes.
@@ -84,9 +84,9 @@ def survey_sweep(
         needed = {anchor.frame for anchor in anchors}
         held = [i for i in range(verify_every - 1, len(pictures), verify_every) if i not in needed]
         blind = [none_of(spots) if i in held else spots for i, spots in enumerate(pictures)]
-        part = survey_sky(blind, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
+        part = survey_sky(blind, anchors, camera, tape_sigma_m=tape_sigma_m, free=free, progress=step)
         verification = verify(part, [pictures[i] for i in held])
-    sky = survey_sky(pictures, anchors, camera, tape_std_m=tape_std_m, free=free, progress=step)
+    sky = survey_sky(pictures, anchors, camera, tape_sigma_m=tape_sigma_m, free=free, progress=step)
     used = sky.adjusted.used
     residual_px = sky.adjusted.residual_px[used]
     structure = find_structure(sky.seen.pixel[used], residual_px, camera.width, camera.height)
@@ -137,7 +137,7 @@ def _outcome(
     pictures: int,
     warnings: tuple[str, ...],
 ) -> Outcome:
-    shape_m = float(np.median(sky.std_m))
+    shape_m = float(np.median(sky.sigma_m))
     tape_m = float(np.sqrt((sky.tape_residual_m**2).sum(axis=1).mean()))
     height_m = sky.camera.ceiling_height_above_camera_m
     summary = (
@@ -161,11 +161,11 @@ def _outcome(
     }
     if verification is not None:
         residual["verification_rms"] = Quantity(verification.rms_m, math.nan, "m")
-        residual["verification_star_rms"] = Quantity(verification.star_std_m, math.nan, "m")
+        residual["verification_star_rms"] = Quantity(verification.star_sigma_m, math.nan, "m")
         residual["verification_matched"] = Quantity(verification.matched_ratio, math.nan, "1")
         residual["verification_clipped"] = Quantity(verification.clipped_ratio, math.nan, "1")
         notes |= {"pictures_held_out": verification.pictures, "pictures_verified": verification.solved}
-    quantities = camera_quantities(sky.camera, sky.adjusted.std_camera)
+    quantities = camera_quantities(sky.camera, sky.adjusted.sigma_camera)
     quantities["star_std_median"] = Quantity(shape_m, math.nan, "m")
     residual_px = sky.adjusted.residual_px[sky.adjusted.used]
     verified_m = np.zeros((0, 2)) if verification is None else verification.residual_m
@@ -178,7 +178,7 @@ def _outcome(
         draw=partial(
             draw_survey,
             sky.star_m,
-            sky.std_m,
+            sky.sigma_m,
             sky.times_seen,
             sky.pose,
             residual_px,

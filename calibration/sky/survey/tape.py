@@ -36,14 +36,14 @@ class TapeFit:
     rms_m: float
 
 
-def fit_tape(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_std_m: float) -> TapeFit:
+def fit_tape(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_sigma_m: float) -> TapeFit:
     """Lay the map on the tape's numbers.
 
     Args:
         names: Of the anchors.
         map_m: Where the pictures put them, shape (a,), up to a similarity near scale 1.
         tape_m: By tape, shape (a,).
-        tape_std_m: How well the tape was read, one sigma per axis.
+        tape_sigma_m: How well the tape was read, one sigma per axis.
 
     Raises:
         TapeError: The anchors are in one place, at an impossible scale, or contradict each other.
@@ -59,12 +59,12 @@ def fit_tape(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_std_m: 
     # The fit takes up four of the 2a numbers; what is left is that much smaller than the tape's error.
     freedom = 2 * len(names) - 4
     rms_m = float(np.sqrt((left**2).mean()))
-    if freedom > 0 and float((left**2).sum()) > freedom * (_OUTLIER_SIGMAS * tape_std_m) ** 2:
-        raise TapeError(_accuse(names, map_m, tape_m, tape_std_m, rms_m))
+    if freedom > 0 and float((left**2).sum()) > freedom * (_OUTLIER_SIGMAS * tape_sigma_m) ** 2:
+        raise TapeError(_accuse(names, map_m, tape_m, tape_sigma_m, rms_m))
     return TapeFit(factor, shift, rms_m)
 
 
-def _accuse(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_std_m: float, rms_m: float) -> str:
+def _accuse(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_sigma_m: float, rms_m: float) -> str:
     """Say which anchor is wrong, where the others agree without it and there is one more to judge by."""
     verdicts = []
     for one in range(len(names)):
@@ -72,10 +72,10 @@ def _accuse(names: Sequence[str], map_m: Complex, tape_m: Complex, tape_std_m: f
         factor, shift = _similarity(map_m[rest], tape_m[rest])
         left = np.abs(factor * map_m[rest] + shift - tape_m[rest])
         freedom = 2 * int(rest.sum()) - 4
-        agrees = float((left**2).sum()) <= freedom * (_OUTLIER_SIGMAS * tape_std_m) ** 2
+        agrees = float((left**2).sum()) <= freedom * (_OUTLIER_SIGMAS * tape_sigma_m) ** 2
         if freedom > 0 and agrees and _SCALE_RANGE[0] < abs(factor) < _SCALE_RANGE[1]:
             verdicts.append((one, abs(factor * map_m[one] + shift - tape_m[one])))
-    contradiction = f"the anchors contradict each other by {rms_m:.3g} m (tape sigma {tape_std_m:.3g} m)"
+    contradiction = f"the anchors contradict each other by {rms_m:.3g} m (tape sigma {tape_sigma_m:.3g} m)"
     if len(verdicts) == 1:
         one, off = verdicts[0]
         return f"{contradiction}: anchor '{names[one]}' lies {off:.3g} m from where the others put it"

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from calibration.sky.survey.surveyed_sky import SurveyedSky
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
@@ -32,7 +32,7 @@ class Verification:
         spots: How many spots the solved pictures have.
         clipped: How many of them lie near a star, yet too far off for the pose to rest on them. Many of
             them say that the list is worse than its residuals.
-        star_std_m: Root mean square per axis of the stars' mean residuals, of stars seen three times or
+        star_sigma_m: Root mean square per axis of the stars' mean residuals, of stars seen three times or
             more: what is wrong with the places themselves; NaN if there is none.
         worst_star: Name of the star that is farthest off, empty if there is none.
         worst_m: How far.
@@ -43,7 +43,7 @@ class Verification:
     residual_m: Array
     spots: int
     clipped: int
-    star_std_m: float
+    star_sigma_m: float
     worst_star: str
     worst_m: float
 
@@ -75,7 +75,7 @@ def sentence_of(found: Verification) -> str:
     )
     if found.worst_star:
         words += (
-            f", {1e3 * found.star_std_m:.3f} mm of the stars themselves, "
+            f", {1e3 * found.star_sigma_m:.3f} mm of the stars themselves, "
             f"star {found.worst_star} farthest off by {1e3 * found.worst_m:.2f} mm"
         )
     return words + "."
@@ -84,10 +84,10 @@ def sentence_of(found: Verification) -> str:
 def verify(sky: SurveyedSky, held: Sequence[Spots]) -> Verification:
     """Solve pictures with the stars of a survey that they had no part in."""
     x_m, y_m = sky.star_m.T
-    std_m = np.sqrt((sky.std_m**2).mean(axis=1))
-    tracker = StarTracker(StarCatalogue(sky.ids, x_m.copy(), y_m.copy(), std_m), sky.camera)
+    sigma_m = np.sqrt((sky.sigma_m**2).mean(axis=1))
+    tracker = StarTracker(StarCatalogue(sky.ids, x_m.copy(), y_m.copy(), sigma_m), sky.camera)
     answers = [(tracker.solve(spots), spots) for spots in held]
-    solved = [(answer, spots) for answer, spots in answers if isinstance(answer, StarFix)]
+    solved = [(answer, spots) for answer, spots in answers if isinstance(answer, PictureFix)]
     fixes = [fix for fix, _ in solved]
     if not fixes:
         return Verification(len(held), 0, np.zeros((0, 2)), 0, 0, math.nan, "", math.nan)
@@ -104,20 +104,20 @@ def verify(sky: SurveyedSky, held: Sequence[Spots]) -> Verification:
     mean = total[often] / count[often, None]
     off = np.hypot(mean[:, 0], mean[:, 1])
     worst = int(off.argmax())
-    star_std_m = float(np.sqrt((mean**2).mean()))
+    star_sigma_m = float(np.sqrt((mean**2).mean()))
     return Verification(
         pictures=len(held),
         solved=len(fixes),
         residual_m=residual,
         spots=total_spots,
         clipped=clipped,
-        star_std_m=star_std_m,
+        star_sigma_m=star_sigma_m,
         worst_star=sky.ids[int(often[worst])],
         worst_m=float(off[worst]),
     )
 
 
-def _near_a_star(sky: SurveyedSky, rays: CeilingRays, solved: Sequence[tuple[StarFix, Spots]]) -> int:
+def _near_a_star(sky: SurveyedSky, rays: CeilingRays, solved: Sequence[tuple[PictureFix, Spots]]) -> int:
     """Count the spots that are matched, or whose place by the pose lies near a star."""
     tree = cKDTree(sky.star_m)
     apart = np.asarray(tree.query(sky.star_m, k=2)[0])[:, 1]

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from pydantic import BaseModel, ConfigDict, Field
 
 from groundstation.control.controller import NO_NEIGHBOURS
-from groundstation.control.envelope import WrenchEnvelope
+from groundstation.control.controllers import ControllerRow
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.registry import ControllerRow
-from groundstation.control.state import ControlState, Goal, Wrench, clamp, limit_length, rotate
+from groundstation.control.state import BodyWrench, ControlState, Goal, clamp, limit_length, rotate
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
 LARGEST_ERROR_M, LARGEST_ERROR_RAD = 0.1, 0.2
@@ -51,9 +51,9 @@ class Spring:
         goal: Goal,
         dt_s: float,
         *,
-        applied: Wrench | None = None,
+        applied: BodyWrench | None = None,
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> Wrench:
+    ) -> BodyWrench:
         """See ``groundstation.control.controller.Controller.update``."""
         del applied, neighbours
         if not (math.isfinite(dt_s) and dt_s > 0.0):
@@ -68,9 +68,8 @@ class Spring:
             self._vehicle.mass_kg * (self._stiffness * way_y + self._damping * (vy_goal - vy)),
         )
         turning_rad_s2 = self._stiffness * turn + self._damping * (goal.rate_rad_s - state.rate_rad_s)
-        return self._envelope.saturate(
-            Wrench(rotate(force_table_n, -state.heading_rad), self._vehicle.inertia_kg_m2 * turning_rad_s2)
-        )
+        torque_nm = self._vehicle.inertia_kg_m2 * turning_rad_s2
+        return self._envelope.saturate(BodyWrench(rotate(force_table_n, -state.heading_rad), torque_nm))
 
 
 SPRING = ControllerRow("pull to the goal pose like a damped spring", SpringConfig, Spring)

@@ -5,13 +5,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from groundstation.control.registry import ControllerRow, controllers
+from groundstation.control.controllers import ControllerRow, controllers
 from groundstation.control.state import Goal
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.parts.control.actions import GO_TO
-from groundstation.parts.control.controller import Controller
+from groundstation.parts.control.controller_node import ControllerNode
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of
@@ -32,7 +32,7 @@ def _controller(rig: Rig, vehicle: str) -> Node:
     config = row.config.model_validate(section.parameters)
     law = row.make(config, rig.type_of(vehicle).model(), keep_in)
     goal = Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg))
-    return Controller(
+    return ControllerNode(
         vehicle,
         law,
         section.controller,
@@ -86,7 +86,7 @@ PART = Part(
     name="control",
     summary="the state becomes the wrench that the controller wants",
     topics=(Wrench, ControlStatus),
-    nodes=(NodeRow("controller", _process, Weight.LIGHT, Controller, _controller),),
+    nodes=(NodeRow("controller", _process, Weight.LIGHT, ControllerNode, _controller),),
     actions=(GO_TO,),
     mock_up=ControlOfType,
     vehicle=ControlOfVehicle,

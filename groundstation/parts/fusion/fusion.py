@@ -11,8 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
-from groundstation.fusion.estimator import WAITS, Estimator, Fix, ImuPacket, PlanarState
-from groundstation.fusion.estimator import FixAccount as Account
+from groundstation.fusion.estimator import WAITS, Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
@@ -73,7 +72,7 @@ class Fusion(Node):
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
-        self._waiting: dict[tuple[int, str], tuple[int, Account]] = {}
+        self._waiting: dict[tuple[int, str], tuple[int, FixOutcome]] = {}
 
     def start(self, now_ns: int) -> Iterator[Message]:
         if self._calibration:
@@ -102,7 +101,7 @@ class Fusion(Node):
         biases = (
             (0.0, 0.0, 0.0)
             if state is None
-            else (state.bias_omega_rad_s, state.bias_ax_m_s2, state.bias_ay_m_s2)
+            else (state.bias_rate_rad_s, state.bias_ax_m_s2, state.bias_ay_m_s2)
         )
         yield FusionStatus(
             now_ns,
@@ -147,14 +146,14 @@ class Fusion(Node):
     def _correct(self, fix: PoseFix, source: str, now_ns: int) -> Iterator[Message]:
         covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
-            motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.omega_rad_s])
+            motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.rate_rad_s])
             covariance += fix.stamp_sigma_s**2 * np.outer(motion, motion)
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
         )
         yield from self._hear_account(account, now_ns)
 
-    def _hear_account(self, account: Account, now_ns: int) -> Iterator[FixAccount]:
+    def _hear_account(self, account: FixOutcome, now_ns: int) -> Iterator[FixAccount]:
         """Pass on what became of a fix, once: when packets up to its exposure, or a second fix, are here."""
         if account.reason in (WAITS, CANDIDATE):
             self._waiting[account.t_exposure_ns, account.source] = now_ns, account
@@ -169,7 +168,7 @@ class Fusion(Node):
             elif account.reason == CANDIDATE and now_ns - arrived_ns > LONGEST_ALONE_NS:
                 yield self._account(account, now_ns)
 
-    def _account(self, account: Account, now_ns: int) -> FixAccount:
+    def _account(self, account: FixOutcome, now_ns: int) -> FixAccount:
         self._waiting.pop((account.t_exposure_ns, account.source), None)
         self._used += account.used
         self._refused += not account.used
@@ -199,8 +198,8 @@ class Fusion(Node):
             (state.x_m, state.y_m),
             wrap_angle(state.heading_rad),
             (state.vx_m_s, state.vy_m_s),
-            state.omega_rad_s,
-            (state.std_x_m, state.std_y_m, state.std_heading_rad),
+            state.rate_rad_s,
+            (state.sigma_x_m, state.sigma_y_m, state.sigma_heading_rad),
             _status(state),
             self._fix_stamp_ns,
         )

@@ -27,7 +27,7 @@ class VehicleState(Message):
         heading_rad: In [-pi, pi).
         velocity_table_m_s: x, y.
         rate_rad_s: Bias-corrected turn rate.
-        pose_std: Standard deviations of x, y (m) and heading (rad).
+        pose_sigma: Standard deviations of x, y (m) and heading (rad).
         status: ``starting``, ``resting``, ``flying`` or ``lost``.
         fix_stamp_ns: Exposure of the newest fix inside, 0 before the first.
     """
@@ -38,7 +38,7 @@ class VehicleState(Message):
     heading_rad: F64
     velocity_table_m_s: Float64x2
     rate_rad_s: F64
-    pose_std: Float64x3
+    pose_sigma: Float64x3
     status: Text
     fix_stamp_ns: I64
 

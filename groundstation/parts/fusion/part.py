@@ -8,7 +8,7 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator
-from groundstation.fusion.registry import ESTIMATORS
+from groundstation.fusion.estimators import ESTIMATORS
 from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.fusion import NO_FILES, Fusion

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import model_validator
 
 from groundstation.declarations.section import Positive, Section
-from groundstation.fusion.registry import ESTIMATORS
+from groundstation.fusion.estimators import ESTIMATORS
 
 
 class FusionSection(Section):

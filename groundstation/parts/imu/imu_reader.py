@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
+from drivers.imu_block.block_commands import encode_identify, encode_set_averaging
 from drivers.imu_block.clock import TickClock, TickStamp
-from drivers.imu_block.commands import encode_identify, encode_set_averaging
 from drivers.imu_block.protocol import FrameParser, Identity, ImuFrame
 from drivers.imu_block.sensors import (
     Environment,
@@ -123,7 +123,7 @@ class ImuReader(Node):
             stamp.tick,
             stamp.elapsed_ticks or 0,
             frame.sample_count * TICK_S,
-            stamp.stamp_std_s,
+            stamp.stamp_sigma_s,
             rate_rad_s(frame.gyro_counts),
             (specific_force_m_s2(x), specific_force_m_s2(y)),
             self._temperature_c(),
@@ -137,7 +137,7 @@ class ImuReader(Node):
         """Why samples of this stream cannot be used, whatever they say; empty if they can."""
         if self._found_number is not None and self._serial_number not in (None, self._found_number):
             return f"this is block {self._found_number}, the rig wants {self._serial_number}"
-        if stamp.stamp_std_s > WORST_STAMP_S:
+        if stamp.stamp_sigma_s > WORST_STAMP_S:
             return f"frames do not come at the rate of averaging = {self._averaging}"
         return ""
 

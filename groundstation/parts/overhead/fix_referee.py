@@ -28,19 +28,19 @@ class FixReferee(Node):
 
     Args:
         vehicle: Its name.
-        star_floor_std: What calibration leaves in every star fix: x, y (m), heading (rad).
-        overhead_floor_std: Likewise in every overhead fix.
+        star_floor_sigma: What calibration leaves in every star fix: x, y (m), heading (rad).
+        overhead_floor_sigma: Likewise in every overhead fix.
     """
 
     inputs = (StarFix, OverheadFix, VehicleState)
     outputs = (FixComparison,)
 
     def __init__(
-        self, vehicle: str, star_floor_std: tuple[float, float], overhead_floor_std: tuple[float, float]
+        self, vehicle: str, star_floor_sigma: tuple[float, float], overhead_floor_sigma: tuple[float, float]
     ) -> None:
         super().__init__(vehicle)
         self._floor = np.zeros((3, 3))
-        for xy_m, heading_rad in (star_floor_std, overhead_floor_std):
+        for xy_m, heading_rad in (star_floor_sigma, overhead_floor_sigma):
             self._floor += np.diag([xy_m**2, xy_m**2, heading_rad**2])
         self._memory: StateMemory[VehicleState] = StateMemory()
         self._stars: deque[StarFix] = deque()
@@ -85,17 +85,17 @@ class FixReferee(Node):
         turn = star.heading_rad - overhead.heading_rad + velocity[2] * apart_s
         difference[2] = wrap_angle(float(turn))
         stamp_variance_s2 = star.stamp_sigma_s**2 + overhead.stamp_sigma_s**2
-        cov = self._floor + stamp_variance_s2 * np.outer(velocity, velocity)
+        covariance = self._floor + stamp_variance_s2 * np.outer(velocity, velocity)
         for fix in (star, overhead):
-            cov = cov + np.array(fix.covariance).reshape(3, 3)
-        nis, verdict = self._referee.judge(difference, cov)
-        std = np.sqrt(np.diag(cov)).tolist()
+            covariance = covariance + np.array(fix.covariance).reshape(3, 3)
+        nis, verdict = self._referee.judge(difference, covariance)
+        sigma = np.sqrt(np.diag(covariance)).tolist()
         return FixComparison(
             star.stamp_ns,
             self.vehicle,
             apart_s,
             (float(difference[0]), float(difference[1]), float(difference[2])),
-            (std[0], std[1], std[2]),
+            (sigma[0], sigma[1], sigma[2]),
             nis,
             verdict.pairs,
             verdict.mean_difference,

@@ -74,7 +74,7 @@ class FixComparison(Message):
     Attributes:
         apart_s: Exposure of the overhead fix after that of the star fix.
         difference: Star fix minus overhead fix, carried to one moment: x, y (m), heading (rad).
-        std: Standard deviations of the difference: x, y (m), heading (rad).
+        sigma: Standard deviations of the difference: x, y (m), heading (rad).
         nis: Normalised difference squared, 3 degrees of freedom.
         pairs: Compared lately; the following speak of them.
         mean_difference: As ``difference``.
@@ -87,7 +87,7 @@ class FixComparison(Message):
     TOPIC: ClassVar = Topic("fix_comparison", 1.5)
     apart_s: F64
     difference: Float64x3
-    std: Float64x3
+    sigma: Float64x3
     nis: F64
     pairs: U16
     mean_difference: Float64x3

@@ -12,7 +12,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig_file import RigFile
 from groundstation.frames import wrap_angle
-from groundstation.overhead import tracker as overhead
+from groundstation.overhead import circle_tracker as overhead
 from groundstation.overhead.liveries import parse_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.parts.operation.messages import CalibrationInUse
@@ -77,8 +77,8 @@ class OverheadTracker(Node):
                 answer.x_m,
                 answer.y_m,
                 wrap_angle(answer.heading_rad),
-                tuple(answer.cov.ravel().tolist()),
-                self._delay.delay_std_s,
+                tuple(answer.covariance.ravel().tolist()),
+                self._delay.delay_sigma_s,
                 answer.circles,
                 answer.whole,
                 answer.misfit_m,
@@ -88,5 +88,5 @@ class OverheadTracker(Node):
     def _refusal(self, stamp_ns: int, vehicle: str, reason: str) -> OverheadFix:
         nan = math.nan
         return OverheadFix(
-            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._delay.delay_std_s, 0, 0, nan, reason
+            stamp_ns, vehicle, False, nan, nan, nan, (nan,) * 9, self._delay.delay_sigma_s, 0, 0, nan, reason
         )

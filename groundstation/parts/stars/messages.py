@@ -116,7 +116,7 @@ class SkyChange(Message):
         star: Id of the catalogue, empty for a light that is none of its stars.
         x_m: Where it is seen now, or was last, in the table frame.
         y_m: Where it is seen now, or was last, in the table frame.
-        place_cov: Covariance of that place: xx, xy, yy in m^2.
+        place_covariance: Covariance of that place: xx, xy, yy in m^2.
         sightings: How many sightings (of a dead star: misses) speak for it.
     """
 
@@ -126,7 +126,7 @@ class SkyChange(Message):
     star: Text
     x_m: F64
     y_m: F64
-    place_cov: Float64x3
+    place_covariance: Float64x3
     sightings: U32
 
 

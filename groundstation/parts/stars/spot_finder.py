@@ -54,7 +54,7 @@ class SpotFinder(Node):
             _single(spots.u_px),
             _single(spots.v_px),
             _single(spots.flux_dn),
-            _single(spots.cov_px2),
+            _single(spots.covariance_px2),
             _single(spots.elongation),
             _single(spots.streak_px),
             spots.background_dn,

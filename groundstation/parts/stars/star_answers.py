@@ -13,7 +13,9 @@ from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.picture_notes import PictureNotes
 
 
-def fix_message(spots: StarSpots, answer: fixes.StarFix, exposure_ns: int, stamp_sigma_s: float) -> StarFix:
+def fix_message(
+    spots: StarSpots, answer: fixes.PictureFix, exposure_ns: int, stamp_sigma_s: float
+) -> StarFix:
     """The pose found in a set of spots, stamped with the middle of their exposure."""
     return StarFix(
         exposure_ns,
@@ -22,7 +24,7 @@ def fix_message(spots: StarSpots, answer: fixes.StarFix, exposure_ns: int, stamp
         answer.x_m,
         answer.y_m,
         wrap_angle(answer.heading_rad),
-        tuple(answer.cov.ravel().tolist()),
+        tuple(answer.covariance.ravel().tolist()),
         stamp_sigma_s,
         answer.stars,
         answer.mode.value,
@@ -46,7 +48,7 @@ def change_message(spots: StarSpots, found: sky_change.SkyChange, exposure_ns: i
         found.star,
         found.x_m,
         found.y_m,
-        found.cov_m2,
+        found.covariance_m2,
         found.sightings,
     )
 
@@ -58,7 +60,7 @@ def change_of(message: SkyChange) -> sky_change.SkyChange:
         message.star,
         message.x_m,
         message.y_m,
-        message.place_cov,
+        message.place_covariance,
         message.sightings,
     )
 
@@ -98,7 +100,7 @@ def notes_of(message: StarMatches) -> PictureNotes:
 def belief_of(state: VehicleState, stamp_sigma_s: float) -> fixes.PosePrior:
     """What the filter believes of the pose at the exposure, whose stamp is uncertain too."""
     motion = np.array([*state.velocity_table_m_s, state.rate_rad_s])
-    covariance = np.diag(np.square(state.pose_std)) + stamp_sigma_s**2 * np.outer(motion, motion)
+    covariance = np.diag(np.square(state.pose_sigma)) + stamp_sigma_s**2 * np.outer(motion, motion)
     return fixes.PosePrior(*state.position_table_m, state.heading_rad, covariance)
 
 

@@ -18,8 +18,7 @@ from groundstation.parts.stars.picture_choice import PictureChoice
 from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, PosePrior
-from groundstation.star_tracking.fixes import StarFix as Fix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior
 from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.prior_governor import PriorGovernor
 from groundstation.star_tracking.sky_watch import SkyWatch
@@ -118,13 +117,13 @@ class StarTracker(Node):
     def _exposure(self, spots: StarSpots) -> tuple[int, float]:
         """Middle of the exposure and its standard deviation: from the driver's stamp where there is one."""
         stamp_ns = spots.device_stamp_ns or spots.stamp_ns
-        return self._delay.middle_ns(stamp_ns), self._delay.delay_std_s
+        return self._delay.middle_ns(stamp_ns), self._delay.delay_sigma_s
 
     def _explain(
         self,
         spots: StarSpots,
         lights: Spots,
-        answer: Fix | NoFix,
+        answer: PictureFix | NoFix,
         kind: str,
         reason: str,
         belief: PosePrior | None,
@@ -140,5 +139,5 @@ class StarTracker(Node):
         if motion is None:
             return False
         speed_m_s = abs(complex(motion.vx_table_m_s, motion.vy_table_m_s))
-        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.omega_rad_s)
+        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.rate_rad_s)
         return speed_m_s * readout_s < _STILL_M

@@ -1,6 +1,6 @@
 """Part ``valves``: the wrench becomes pulses, one choice of them, guarded commands and frames on the bus."""
 
-from drivers.valve_bus.guard import Guard as Gate
+from drivers.valve_bus.guard import Guard
 from drivers.valve_bus.valve_budget import OpenTimeLimits
 from groundstation.control.allocation import Allocator
 from groundstation.control.brake import BrakeConfig
@@ -12,10 +12,10 @@ from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import LABORATORY, Rig
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.parts.valves.actions import FLOAT_AIR, GUARD, MULTIPLEXER
-from groundstation.parts.valves.allocation import Allocation
-from groundstation.parts.valves.command_mux import CommandMux
+from groundstation.parts.valves.allocation_node import AllocationNode
+from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.gauges import GAUGES
-from groundstation.parts.valves.guard import Guard
+from groundstation.parts.valves.guard_node import GuardNode
 from groundstation.parts.valves.messages import (
     CanIn,
     CanOut,
@@ -25,7 +25,7 @@ from groundstation.parts.valves.messages import (
     ValveStatus,
     VehicleMode,
 )
-from groundstation.parts.valves.port import ValveBusPort
+from groundstation.parts.valves.port import ValveBus
 from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
 from groundstation.parts.valves.valve_writer import ValveWriter
 
@@ -45,19 +45,19 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
     """With modulators of its own for braking and for pushing by hand."""
     type_ = rig.type_of(vehicle)
     modulators = _modulator(type_), _modulator(type_)
-    return CommandMux(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators, rig.table.keep_in())
+    return CommandMuxNode(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators, rig.table.keep_in())
 
 
 def _guard(rig: Rig, vehicle: str) -> Node:
     limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
-    gate = Gate(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
+    guard = Guard(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
     nodes = rig.tables.nodes
     absent = {
         row.name: f"this vehicle has no {row.answered_by.replace('_', ' ')}"
         for row in rig.tables.actions.values()
         if not {vehicle, ""} & set(nodes[row.answered_by].vehicles(rig))
     }
-    return Guard(vehicle, gate, frozenset(rig.tables.actions), absent)
+    return GuardNode(vehicle, guard, frozenset(rig.tables.actions), absent)
 
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:
@@ -65,12 +65,12 @@ def _valve_writer(rig: Rig, vehicle: str) -> Node:
 
 
 def _allocation(rig: Rig, vehicle: str) -> Node:
-    return Allocation(vehicle, _modulator(rig.type_of(vehicle)))
+    return AllocationNode(vehicle, _modulator(rig.type_of(vehicle)))
 
 
 def _port(rig: Rig, vehicle: str) -> Port:
     del vehicle
-    return ValveBusPort("valve_bus", "", rig.section(ValvesOfRig).valve_bus, tuple(rig.vehicles))
+    return ValveBus("valve_bus", "", rig.section(ValvesOfRig).valve_bus, tuple(rig.vehicles))
 
 
 def _check(rig: Rig) -> None:
@@ -103,12 +103,12 @@ PART = Part(
     summary="the wrench becomes pulses; one source is chosen, guarded and sent over the valve bus",
     topics=(CanIn, ValveStatus, VehicleMode, ValveDemand, ValveSelection, ValveCommand, CanOut),
     nodes=(
-        NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMux, _command_mux),
-        NodeRow("guard", COMMANDS, Weight.URGENT, Guard, _guard),
+        NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMuxNode, _command_mux),
+        NodeRow("guard", COMMANDS, Weight.URGENT, GuardNode, _guard),
         NodeRow("valve_writer", COMMANDS, Weight.URGENT, ValveWriter, _valve_writer),
-        NodeRow("allocation", FLIGHT, Weight.LIGHT, Allocation, _allocation),
+        NodeRow("allocation", FLIGHT, Weight.LIGHT, AllocationNode, _allocation),
     ),
-    ports=(PortRow("valve_writer", ValveBusPort, _port, is_of_rig=True),),
+    ports=(PortRow("valve_writer", ValveBus, _port, is_of_rig=True),),
     actions=(*GUARD.values(), *MULTIPLEXER.values(), *FLOAT_AIR.values()),
     rig=ValvesOfRig,
     vehicle=ValvesOfVehicle,

@@ -11,9 +11,9 @@ from groundstation.parts.valves.messages import CanIn, CanOut
 
 class _CanEdge(Edge):
     def __init__(self, config: Mapping[str, object]) -> None:
-        from drivers.valve_bus.port import ValveBusPort as ValveBusDriver
+        from drivers.valve_bus.port import ValveBusPort
 
-        self._bus = ValveBusDriver(config)
+        self._bus = ValveBusPort(config)
 
     def read(self) -> Iterable[tuple[int, object]]:
         found = self._bus.read(READ_TIMEOUT_S)
@@ -28,7 +28,7 @@ class _CanEdge(Edge):
 
 
 @dataclass(frozen=True)
-class ValveBusPort(Port):
+class ValveBus(Port):
     """Frames of all vehicles in both directions."""
 
     reads = CanIn

@@ -21,7 +21,7 @@ from drivers.valve_bus.protocol import Arm, CanFrame, ValveStatus, decode, encod
 from firmware_emulator.device_kind import PictureOrder
 from firmware_emulator.devices.star_camera import Exposure
 from firmware_emulator.live.cameras import CameraProcess
-from firmware_emulator.live.command import main
+from firmware_emulator.live.command_line import main
 from firmware_emulator.live.pty_port import PtyPort
 from firmware_emulator.live.slcan import SlcanSession, encode_frame
 from firmware_emulator.live.tcp_server import MAX_WAITING_BYTES, TcpServer

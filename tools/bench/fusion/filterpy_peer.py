@@ -45,7 +45,7 @@ class FilterpyPeer(LatePeer):
     def _advance(self, reading: Reading) -> None:
         if self.is_at_rest(reading):
             density = self.noise.gyro_density_rad_s_rthz, *(self.noise.acc_density_m_s2_rthz,) * 2
-            seen = np.array([reading.omega_rad_s, reading.ax_m_s2, reading.ay_m_s2])
+            seen = np.array([reading.rate_rad_s, reading.ax_m_s2, reading.ay_m_s2])
             self._update(
                 at_rest_jacobian(self._x), seen - at_rest(self._x), np.diag(np.square(density) / reading.dt_s)
             )
@@ -56,22 +56,22 @@ class FilterpyPeer(LatePeer):
 
     def _correct(self, fix: Fix, innovation: Array) -> tuple[bool, float]:
         jacobian = pose_jacobian(self._x, self.noise)
-        spread = jacobian @ self._filter.P @ jacobian.T + fix.cov
+        spread = jacobian @ self._filter.P @ jacobian.T + fix.covariance
         nis = float(innovation @ np.linalg.solve(spread, innovation))
         is_used = nis < GATE or self._refusals >= REOPEN_AFTER
         if nis >= GATE and is_used:
             self._filter.P[range(5), range(5)] += np.square(REOPENED_SIGMA)
         self._refusals = 0 if is_used else self._refusals + 1
         if is_used:
-            self._update(jacobian, innovation, fix.cov)
+            self._update(jacobian, innovation, fix.covariance)
         self._took()
         return is_used, nis
 
-    def _update(self, jacobian: Array, innovation: Array, cov: Array) -> None:
+    def _update(self, jacobian: Array, innovation: Array, covariance: Array) -> None:
         """By the linear filter: its state is ours, its measurement what would give the innovation."""
         self._filter.x = self._x[:, None]
-        self._filter.update((innovation + jacobian @ self._x)[:, None], R=cov, H=jacobian)
+        self._filter.update((innovation + jacobian @ self._x)[:, None], R=covariance, H=jacobian)
         self._x = np.array(self._filter.x[:, 0])
 
     def _took(self) -> None:
-        self._std = np.sqrt(np.diag(self._filter.P)[[3, 4, 0]])
+        self._sigma = np.sqrt(np.diag(self._filter.P)[[3, 4, 0]])

@@ -74,14 +74,14 @@ class GtsamPeer(LatePeer):
         seen = pose_of(self._x, self.noise) + innovation
         model = self._gtsam.noiseModel
         kernel = model.mEstimator.Cauchy.Create(CAUCHY_SIGMAS)
-        robust = model.Robust.Create(kernel, model.Gaussian.Covariance(fix.cov))
+        robust = model.Robust.Create(kernel, model.Gaussian.Covariance(fix.covariance))
         graph.add(
             self._unary(lambda x: (pose_of(x, self.noise) - seen, pose_jacobian(x, self.noise)), robust)
         )
-        nis = float(innovation @ np.linalg.solve(fix.cov, innovation))
+        nis = float(innovation @ np.linalg.solve(fix.covariance, innovation))
         self._update(graph, self._x)
         residual = pose_of(self._x, self.noise) - seen
-        return float(residual @ np.linalg.solve(fix.cov, residual)) < BELIEVED, nis
+        return float(residual @ np.linalg.solve(fix.covariance, residual)) < BELIEVED, nis
 
     def _update(self, graph: Foreign, guess: Array) -> None:
         values = self._gtsam.Values()
@@ -92,7 +92,7 @@ class GtsamPeer(LatePeer):
         self._stretch = Stretch(self._x, self.noise)
 
     def _between(self, before: int, stretch: Stretch) -> Foreign:
-        cov = stretch.covariance(float(self._before[0])) / np.outer(UNIT, UNIT)
+        covariance = stretch.covariance(float(self._before[0])) / np.outer(UNIT, UNIT)
         after, eye = self._node, np.eye(len(UNIT))
 
         def error(factor: Foreign, values: Foreign, jacobians: list[Array] | None) -> Array:
@@ -102,7 +102,7 @@ class GtsamPeer(LatePeer):
                 jacobians[0], jacobians[1] = -by * UNIT / UNIT[:, None], eye
             return np.asarray(values.atVector(after) - predicted / UNIT)
 
-        noise = self._gtsam.noiseModel.Gaussian.Covariance(cov)
+        noise = self._gtsam.noiseModel.Gaussian.Covariance(covariance)
         return self._gtsam.CustomFactor(noise, [before, after], error)
 
     def _resting(self, stretch: Stretch) -> Foreign:

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from bench.fusion.planar import GYRO, HEADING, POSITION, SIZE, Array, Reading, moved, pose_of
-from groundstation.fusion.estimator import Counters, Fix, FixAccount, ImuPacket, PlanarState
+from groundstation.fusion.estimator import Counters, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 
 NS = 1e-9
@@ -26,7 +26,7 @@ class LatePeer(ABC):
         self.noise, self.counters = noise, Counters()
         self._x = np.zeros(SIZE)
         """At the newest exposure."""
-        self._std = np.full(3, _NAN)
+        self._sigma = np.full(3, _NAN)
         """Of x, y, heading at the newest exposure."""
         self._now: Array | None = None
         self._after: deque[Reading] = deque()
@@ -63,7 +63,7 @@ class LatePeer(ABC):
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Integrate open loop."""
         reading = self._screened(
-            Reading(packet.t_ns * NS, packet.dt_s, packet.omega_rad_s, packet.ax_m_s2, packet.ay_m_s2)
+            Reading(packet.t_ns * NS, packet.dt_s, packet.rate_rad_s, packet.ax_m_s2, packet.ay_m_s2)
         )
         self._after.append(reading)
         if self._now is None:
@@ -75,7 +75,7 @@ class LatePeer(ABC):
     def _screened(self, reading: Reading) -> Reading:
         last = self._newest
         force = max(abs(reading.ax_m_s2 - last.ax_m_s2), abs(reading.ay_m_s2 - last.ay_m_s2))
-        rate = abs(reading.omega_rad_s - last.omega_rad_s)
+        rate = abs(reading.rate_rad_s - last.rate_rad_s)
         jumps = not (force < self.noise.max_acc_step_m_s2 and rate < self.noise.max_rate_step_rad_s)
         if jumps and not self._has_jumped:
             self._has_jumped = True
@@ -85,30 +85,30 @@ class LatePeer(ABC):
         self._newest = reading
         return reading
 
-    def add_fix(self, fix: Fix) -> FixAccount:
+    def add_fix(self, fix: Fix) -> FixOutcome:
         """Go to the exposure, correct, run open loop to now."""
         until_s = fix.t_exposure_ns * NS
         if self._now is None:
             is_proved = self._is_near(self._first, fix)
             self._first = fix
             if not is_proved:
-                return FixAccount(fix.t_exposure_ns, False, "waits for a second", _NAN, _NAN, _NAN, _NAN)
+                return FixOutcome(fix.t_exposure_ns, False, "waits for a second", _NAN, _NAN, _NAN, _NAN)
             resting = []
             while self._after and self._after[0].end_s <= until_s:
                 resting.append(self._after.popleft())
             if resting and self.is_at_rest(resting[-1]):
-                self._x[GYRO] = np.mean([reading.omega_rad_s for reading in resting])
+                self._x[GYRO] = np.mean([reading.rate_rad_s for reading in resting])
             self._x[HEADING] = fix.heading_rad
             self._x[POSITION] = np.array([fix.x_m, fix.y_m]) - pose_of(self._x, self.noise)[:2]
             self._start()
-            account = FixAccount(fix.t_exposure_ns, True, "starts the estimate", _NAN, _NAN, _NAN, _NAN)
+            account = FixOutcome(fix.t_exposure_ns, True, "starts the estimate", _NAN, _NAN, _NAN, _NAN)
         else:
             self._go_to(until_s)
             innovation = np.array([fix.x_m, fix.y_m, fix.heading_rad]) - pose_of(self._x, self.noise)
             innovation[2] = math.remainder(innovation[2], math.tau)
             used, nis = self._correct(fix, innovation)
             reason = "used" if used else "outside the gate"
-            account = FixAccount(fix.t_exposure_ns, used, reason, *innovation.tolist(), nis)
+            account = FixOutcome(fix.t_exposure_ns, used, reason, *innovation.tolist(), nis)
         now = self._x
         for reading in self._after:
             if not self.is_at_rest(reading):
@@ -123,7 +123,7 @@ class LatePeer(ABC):
             return False
         turn = math.remainder(second.heading_rad - first.heading_rad, math.tau)
         off = np.array([second.x_m - first.x_m, second.y_m - first.y_m, turn])
-        return float(off @ np.linalg.solve(first.cov + second.cov, off)) < SAME_NIS
+        return float(off @ np.linalg.solve(first.covariance + second.covariance, off)) < SAME_NIS
 
     def _go_to(self, until_s: float) -> None:
         while self._after and self._after[0].end_s <= until_s:
@@ -135,7 +135,7 @@ class LatePeer(ABC):
                 self._advance(first._replace(end_s=until_s, dt_s=before_s))
             self._after.appendleft(first._replace(dt_s=first.dt_s - before_s))
 
-    def settled(self) -> list[FixAccount]:
+    def settled(self) -> list[FixOutcome]:
         """Nothing waits here."""
         return []
 
@@ -144,13 +144,13 @@ class LatePeer(ABC):
         if self._now is None:
             return None
         x, newest = self._now, self._newest
-        rate = 0.0 if newest.end_s <= self._rest_until_s else newest.omega_rad_s - float(x[GYRO])
+        rate = 0.0 if newest.end_s <= self._rest_until_s else newest.rate_rad_s - float(x[GYRO])
         px, py, heading = pose_of(x, self.noise).tolist()
         lx, ly = (x[POSITION] - (px, py)).tolist()
         c, s = math.cos(x[HEADING]), math.sin(x[HEADING])
         return PlanarState(
             round(newest.end_s / NS), px, py, heading, x[1] + rate * ly, x[2] - rate * lx, rate,
-            x[GYRO], x[6] - c * x[8] - s * x[9], x[7] + s * x[8] - c * x[9], *self._std.tolist(), False,
+            x[GYRO], x[6] - c * x[8] - s * x[9], x[7] + s * x[8] - c * x[9], *self._sigma.tolist(), False,
         )  # fmt: skip
 
     def covariance(self) -> Array:

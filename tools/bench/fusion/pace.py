@@ -34,8 +34,10 @@ def pace(folder: Path, factory: EstimatorFactory, repeats: int) -> Pace:
     data = read_folder(folder)
     period_s = data.noise.packet_period_s
     packets = [ImuPacket(round(row[0] * NS), period_s, *row[1:5]) for row in data.imu.tolist()]
-    cov = np.diag([data.noise.star_sigma_xy_m**2] * 2 + [data.noise.star_sigma_heading_rad**2])
-    fixes = [Fix(round(row[0] * NS), round(row[1] * NS), *row[2:5], cov) for row in data.stars.tolist()]
+    covariance = np.diag([data.noise.star_sigma_xy_m**2] * 2 + [data.noise.star_sigma_heading_rad**2])
+    fixes = [
+        Fix(round(row[0] * NS), round(row[1] * NS), *row[2:5], covariance) for row in data.stars.tolist()
+    ]
     image = picture()
     best = [math.inf] * 3
     for _ in range(repeats):

@@ -40,7 +40,7 @@ class Reading(NamedTuple):
 
     end_s: float
     dt_s: float
-    omega_rad_s: float
+    rate_rad_s: float
     ax_m_s2: float
     ay_m_s2: float
 
@@ -48,7 +48,7 @@ class Reading(NamedTuple):
 def moved(x: Array, reading: Reading) -> Array:
     """The state (11,) after a reading, the heading in between taken at its middle."""
     dt = reading.dt_s
-    rate = (reading.omega_rad_s - x[GYRO]) * (1.0 - x[SCALE])
+    rate = (reading.rate_rad_s - x[GYRO]) * (1.0 - x[SCALE])
     c, s = math.cos(x[HEADING] + 0.5 * rate * dt), math.sin(x[HEADING] + 0.5 * rate * dt)
     fx, fy = reading.ax_m_s2 - x[6], reading.ay_m_s2 - x[7]
     a = np.array([c * fx - s * fy + x[8], s * fx + c * fy + x[9]])
@@ -70,7 +70,7 @@ def transition(x: Array, reading: Reading) -> Array:
     by_state[:, SLOPE] = np.eye(2)
     out = np.eye(SIZE)
     out[HEADING, GYRO] = -dt
-    out[HEADING, SCALE] = -(reading.omega_rad_s - x[GYRO]) * dt
+    out[HEADING, SCALE] = -(reading.rate_rad_s - x[GYRO]) * dt
     out[VELOCITY] += by_state * dt
     out[POSITION] += 0.5 * dt * dt * by_state
     out[POSITION, VELOCITY] = dt * np.eye(2)

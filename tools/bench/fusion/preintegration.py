@@ -47,7 +47,7 @@ class Stretch:
         """Readings at rest (omega, ax, ay) times their length."""
         self._turn, self._velocity, self._place = 0.0, np.zeros(2), np.zeros(2)
         self._velocity_by, self._place_by = np.zeros((2, 3)), np.zeros((2, 3))
-        self._cov = np.zeros((5, 5))
+        self._covariance = np.zeros((5, 5))
 
     def rest(self, reading: Reading) -> None:
         """Add a reading at rest."""
@@ -59,7 +59,7 @@ class Stretch:
         """Add a reading in motion."""
         dt = reading.dt_s
         gyro, bias_x, bias_y = self._biases.tolist()
-        rate = (reading.omega_rad_s - gyro) * (1.0 - self._scale)
+        rate = (reading.rate_rad_s - gyro) * (1.0 - self._scale)
         half = self._turn + 0.5 * rate * dt
         c, s = math.cos(half), math.sin(half)
         fx, fy = reading.ax_m_s2 - bias_x, reading.ay_m_s2 - bias_y
@@ -74,21 +74,21 @@ class Stretch:
         step = np.eye(5)
         step[1:3, 0], step[3:, 0] = across * dt, 0.5 * dt * dt * across
         step[3, 1] = step[4, 2] = dt
-        self._cov = step @ self._cov @ step.T
-        self._cov[0, 0] += self.noise.gyro_density_rad_s_rthz**2 * dt
-        self._cov[[1, 2], [1, 2]] += shaking_variance(self.noise, dt)
+        self._covariance = step @ self._covariance @ step.T
+        self._covariance[0, 0] += self.noise.gyro_density_rad_s_rthz**2 * dt
+        self._covariance[[1, 2], [1, 2]] += shaking_variance(self.noise, dt)
         self.moving_s += dt
         self.span_s += dt
 
     def covariance(self, heading_rad: float) -> Array:
         """Of the predicted state (11, 11)."""
-        cov = process_noise(self.noise, self.span_s)
+        covariance = process_noise(self.noise, self.span_s)
         turn = np.eye(5)
         turn[1:3, 1:3] = turn[3:, 3:] = _rotation(heading_rad)
-        cov[:5, :5] = turn @ self._cov @ turn.T
-        cov[range(5), range(5)] += _HELD_VARIANCE
-        cov[SCALE, SCALE] += _CONSTANT_VARIANCE
-        return cov
+        covariance[:5, :5] = turn @ self._covariance @ turn.T
+        covariance[range(5), range(5)] += _HELD_VARIANCE
+        covariance[SCALE, SCALE] += _CONSTANT_VARIANCE
+        return covariance
 
     def predict(self, x: Array) -> tuple[Array, Array]:
         """The state after the stretch (11,) and its derivative by the state before (11, 11)."""

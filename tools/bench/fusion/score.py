@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.data_sets.fusion_folder import read_folder
-from groundstation.fusion.estimator import EstimatorFactory, FixAccount, PlanarState
+from groundstation.fusion.estimator import EstimatorFactory, FixOutcome, PlanarState
 from groundstation.fusion.flight_data import FlightData, estimate
 from groundstation.fusion.offline import OfflineSmoother
 
@@ -78,7 +78,7 @@ def flown(folder: Path, factory: EstimatorFactory, *, is_cleaned: bool = False) 
 
 
 def judge(
-    folder: Path, data: FlightData, states: Sequence[PlanarState | None], accounts: Sequence[FixAccount]
+    folder: Path, data: FlightData, states: Sequence[PlanarState | None], accounts: Sequence[FixOutcome]
 ) -> Figures:
     """Compare with truth.csv and the truth block of meta.json."""
     truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
@@ -119,7 +119,7 @@ def judge(
 
 
 def _fixes(
-    listed: Sequence[Sequence[float]], accounts: Sequence[FixAccount], end_s: float
+    listed: Sequence[Sequence[float]], accounts: Sequence[FixOutcome], end_s: float
 ) -> tuple[int, int, int]:
     """Wrong fixes used, wrong fixes, good fixes refused."""
     stamps = np.array([account.t_exposure_ns * 1e-9 for account in accounts])

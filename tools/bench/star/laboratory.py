@@ -108,5 +108,7 @@ class Laboratory:
 def spots_at(uv: np.ndarray, sigma_px: float = 0.03) -> Spots:
     """Spots without a picture."""
     n = len(uv)
-    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
-    return Spots(uv[:, 0], uv[:, 1], np.linspace(9, 3, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    return Spots(
+        uv[:, 0], uv[:, 1], np.linspace(9, 3, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+    )

@@ -6,7 +6,7 @@ from bench.limits import at_most
 from bench.rows import Bench, Row
 from bench.star.laboratory import CAMERA_FILE, CEILING_FILE, spots_at
 from groundstation.star_tracking.camera_model import CameraCalibration
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
@@ -26,7 +26,7 @@ def measure(bench: Bench) -> list[Row]:
     for lights in COUNTS:
         for _ in range(bench.trials):
             spots = spots_at(rng.uniform((3, 3), corner, (lights, 2)))
-            false += isinstance(tracker.solve(spots), StarFix)
+            false += isinstance(tracker.solve(spots), PictureFix)
             tried += 1
             if tried % 100 == 0:
                 bench.say(f"star: random lights, {tried} of {bench.trials * len(COUNTS)}")

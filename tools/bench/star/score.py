@@ -12,7 +12,7 @@ from bench.limits import short
 from bench.star.laboratory import Frame
 from bench.unit import blur_s
 from groundstation.star_tracking.detection import Detector, Spots
-from groundstation.star_tracking.fixes import NoFix, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix
 
 GATE_M, GATE_RAD = 0.02, np.radians(1.0)
 """A fix outside, or any fix on a picture without the ceiling, is false (as the data sets' scorer says)."""
@@ -74,7 +74,7 @@ class Score:
     def take(
         self,
         frame: Frame,
-        answer: StarFix | NoFix | Answer | None,
+        answer: PictureFix | NoFix | Answer | None,
         unit_ms: float,
         detect_ms: float,
         solve_ms: float,
@@ -85,12 +85,12 @@ class Score:
         self.solve_ms.append(solve_ms)
         if frame.pose is None:
             self.dark_ms.append(detect_ms + solve_ms)
-        if isinstance(answer, StarFix):
-            self._judge(frame, (answer.x_m, answer.y_m, answer.heading_rad), answer.cov)
+        if isinstance(answer, PictureFix):
+            self._judge(frame, (answer.x_m, answer.y_m, answer.heading_rad), answer.covariance)
         else:
             self._judge(frame, None if isinstance(answer, NoFix) else answer, None)
 
-    def _judge(self, frame: Frame, answer: Answer | None, cov: NDArray[np.float64] | None) -> None:
+    def _judge(self, frame: Frame, answer: Answer | None, covariance: NDArray[np.float64] | None) -> None:
         if frame.pose is None:
             self.false += answer is not None
             return
@@ -99,14 +99,14 @@ class Score:
             error[2] = np.angle(np.exp(1j * error[2]))
             if np.hypot(error[0], error[1]) <= GATE_M and abs(error[2]) <= GATE_RAD:
                 self.errors.append((frame.tag, error))
-                if cov is not None:
-                    self.chi2.append(float(error @ np.linalg.solve(cov, error)) / 3.0)
+                if covariance is not None:
+                    self.chi2.append(float(error @ np.linalg.solve(covariance, error)) / 3.0)
                 return
             self.false += 1
         self.missed.append(frame.tag)
 
 
-Solver = Callable[[Spots], StarFix | NoFix | Answer | None]
+Solver = Callable[[Spots], PictureFix | NoFix | Answer | None]
 """Spots to pose: ours with its record, others with a bare pose or None."""
 
 

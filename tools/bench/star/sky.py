@@ -16,7 +16,7 @@ from calibration.sky.self_calibration import calibrate_intrinsics
 from calibration.sky.survey.surveyed_sky import Anchor, survey
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.fixes import BodyMotion, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, PictureFix
 from groundstation.star_tracking.projection import project
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
@@ -67,7 +67,9 @@ def _many_leds(camera: CameraCalibration) -> list[Row]:
         begin = time.process_time()
         answer = tracker.solve(spots)
         times_ms.append(1e3 * (time.process_time() - begin))
-        found += isinstance(answer, StarFix) and np.hypot(answer.x_m - pose[0], answer.y_m - pose[1]) < 0.02
+        found += (
+            isinstance(answer, PictureFix) and np.hypot(answer.x_m - pose[0], answer.y_m - pose[1]) < 0.02
+        )
     median, unit = float(np.median(times_ms)), float(np.median(units_ms))
     note = f"{median / unit:.3g} units of {unit:.3f} ms"
     return [
@@ -83,7 +85,7 @@ def _survey(laboratory: Laboratory, camera: CameraCalibration) -> list[Row]:
     rng, anchors = np.random.default_rng(9), []
     for frame in (20, 40, 60):
         fix = tracker.solve(pictures[frame])
-        if not isinstance(fix, StarFix):
+        if not isinstance(fix, PictureFix):
             raise RuntimeError(f"picture {frame} of the sweep has no fix to click a star in: {fix.detail}")
         spot, star = fix.spot_index[0], int(fix.star_index[0])
         tape = laboratory.leds[star] + rng.normal(0.0, TAPE_STD_M, 2)
@@ -98,7 +100,7 @@ def _survey(laboratory: Laboratory, camera: CameraCalibration) -> list[Row]:
     similarity = (wanted * np.conj(centred)).sum() / (np.abs(centred) ** 2).sum()
     error = similarity * centred - wanted
     rms_mm = 1e3 * float(np.sqrt((np.abs(error) ** 2).mean()))
-    ratio = float(np.sqrt(np.mean((np.column_stack((error.real, error.imag)) / sky.std_m[real]) ** 2)))
+    ratio = float(np.sqrt(np.mean((np.column_stack((error.real, error.imag)) / sky.sigma_m[real]) ** 2)))
     note = f"{int(real.sum())} of {len(true)} LEDs, {int((~real).sum())} others, {len(poses)} pictures"
     return [
         at_most("star: survey of the LEDs, RMS after the best similarity", rms_mm, 0.3, 0.1, "mm", note),
@@ -135,7 +137,7 @@ def _lens(laboratory: Laboratory, camera: CameraCalibration, catalogue: StarCata
         cy=0.5 * (camera.height - 1),
         distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
     )
-    found = calibrate_intrinsics(pictures, catalogue, wrong, wobble_std_m=2e-5)
+    found = calibrate_intrinsics(pictures, catalogue, wrong, wobble_sigma_m=2e-5)
     frames = list(laboratory.frames("easy", PICTURES))
     known = run(frames, StarTracker(catalogue, camera).solve).position_mm("easy")
     ours = run(frames, StarTracker(catalogue, found.camera).solve).position_mm("easy")
@@ -156,7 +158,7 @@ def _rolling_shutter(laboratory: Laboratory, camera: CameraCalibration, catalogu
         fix = tracker.solve(
             detect(laboratory.picture(pose, velocity, 0.01, READOUT_S)), motion=BodyMotion(*velocity)
         )
-        is_fix = isinstance(fix, StarFix)
+        is_fix = isinstance(fix, PictureFix)
         errors.append(np.hypot(fix.x_m - pose[0], fix.y_m - pose[1]) if is_fix else np.nan)
     return at_most(
         "star: rolling shutter 25 ms at 0.5 m/s, velocity known, position RMS",

@@ -22,7 +22,7 @@ def test_the_slope_is_within_its_own_sigma_over_seeds(walk):
     for seed in range(25):
         t, readings, warmth, slope = a_warm_up(seed, walk=walk)
         found = temperature_slope(t, readings, warmth)
-        ratio.append((found.slope - slope) / found.slope_std)
+        ratio.append((found.slope - slope) / found.slope_sigma)
     assert np.sqrt(np.mean(np.square(ratio))) < 1.6
 
 
@@ -48,9 +48,9 @@ def a_spin(seed: int = 0, scale: float = 0.012, seconds: float = 60.0, wrong: in
     rng = np.random.default_rng(seed)
     n = round(seconds * 100)
     t = np.arange(1, n + 1) * 0.01
-    omega = 0.7 * np.sign(np.sin(2 * np.pi * t / 40.0 + 0.3))
-    reading = omega / (1 - scale) - 0.006 + rng.normal(0.0, 7e-4, n)
-    heading = np.cumsum(omega * 0.01)
+    rate = 0.7 * np.sign(np.sin(2 * np.pi * t / 40.0 + 0.3))
+    reading = rate / (1 - scale) - 0.006 + rng.normal(0.0, 7e-4, n)
+    heading = np.cumsum(rate * 0.01)
     fix_t = np.arange(1.0, seconds, 0.667)
     stars = np.interp(fix_t, t, heading) + rng.normal(0.0, 9e-4, len(fix_t))
     picked = rng.choice(len(fix_t), wrong, replace=False)
@@ -63,7 +63,7 @@ def test_the_scale_is_within_its_own_sigma_over_seeds():
     ratio = []
     for seed in range(30):
         found = gyro_scale(*a_spin(seed), null_rad_s=-0.005)
-        ratio.append((found.scale - 0.012) / found.scale_std)
+        ratio.append((found.scale - 0.012) / found.scale_sigma)
         assert found.null_rad_s == pytest.approx(-0.006, abs=1e-4)
     assert 0.6 < np.std(ratio) < 2.5
 

@@ -36,7 +36,7 @@ def test_a_recording_gives_constants_and_slope_map_with_sigmas(tmp_path, grounds
         assert abs(found[name]["value"] - true) < 4.0 * found[name]["std"]
     made = TableMap.load(table_map)
     pull = np.multiply(-9.80665, TILT)
-    sigma = np.sqrt(np.diag(made.mean_cov_m2_s4))
+    sigma = np.sqrt(np.diag(made.mean_covariance_m2_s4))
     assert (np.abs(np.subtract(made.mean_m_s2, pull)) < 4.0 * sigma + 1e-5).all()
     assert set(made.provenance.recordings) == {"run.mcap"}
     assert plot.read_bytes().startswith(b"\x89PNG")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.imu.rests import find_rests
+from calibration.imu.rest_search import find_rests
 
 RATE = 100.0
 SIGMA = np.array([6.7e-4, 6.5e-4, 6.5e-4])

@@ -21,7 +21,7 @@ def on_blocks(rng, tilts, placed_rad=1e-4):
     rests = []
     for along in tilts:
         force = G_M_S2 * np.sin(np.array(along) + placed_rad * rng.normal(size=2))
-        rests.append(Rest(read(rng, force), (STD, STD), tilt_rad=along, tilt_std_rad=placed_rad))
+        rests.append(Rest(read(rng, force), (STD, STD), tilt_rad=along, tilt_sigma_rad=placed_rad))
     return rests
 
 
@@ -32,7 +32,7 @@ def turned(rng, slope, headings=8, said=(0.0, 0.0), noise_rad=3e-4):
         force = -np.array([[c, s], [-s, c]]) @ slope
         seen = float(heading + noise_rad * rng.normal())
         rests.append(
-            Rest(read(rng, force), (STD, STD), heading_rad=seen, heading_std_rad=noise_rad, slope_m_s2=said)
+            Rest(read(rng, force), (STD, STD), heading_rad=seen, heading_sigma_rad=noise_rad, slope_m_s2=said)
         )
     return rests
 
@@ -57,11 +57,11 @@ def test_headings_on_a_tilted_table_tell_difference_and_shear_but_not_the_common
     found = tilt_axes(turned(np.random.default_rng(1), slope))
     assert len(found.unknown) == 2
     assert not any(found.is_known(k) for k in (2, 3, 4, 5))
-    difference, std = combination(found, (1.0, 0.0, 0.0, -1.0))
-    assert std < 6e-3
-    assert abs(difference - (M[0, 0] - M[1, 1])) < 3.0 * std
-    shear, std = combination(found, (0.0, 1.0, 1.0, 0.0))
-    assert abs(shear - (M[0, 1] + M[1, 0])) < 3.0 * std
+    difference, sigma = combination(found, (1.0, 0.0, 0.0, -1.0))
+    assert sigma < 6e-3
+    assert abs(difference - (M[0, 0] - M[1, 1])) < 3.0 * sigma
+    shear, sigma = combination(found, (0.0, 1.0, 1.0, 0.0))
+    assert abs(shear - (M[0, 1] + M[1, 0])) < 3.0 * sigma
 
 
 def test_a_known_slope_tells_the_rest_as_well():
@@ -85,7 +85,7 @@ def test_tilting_along_one_axis_leaves_the_other_axis_unknown():
 def test_tilts_that_were_written_down_wrong_widen_the_sigmas():
     rests = on_blocks(np.random.default_rng(5), BLOCKS * 2)
     good = tilt_axes(rests)
-    rests[1] = Rest(rests[1].reading_m_s2, (STD, STD), tilt_rad=(0.025, 0.0), tilt_std_rad=1e-4)
+    rests[1] = Rest(rests[1].reading_m_s2, (STD, STD), tilt_rad=(0.025, 0.0), tilt_sigma_rad=1e-4)
     bad = tilt_axes(rests)
     assert bad.chi_square_ratio > 20.0 > 3.0 > good.chi_square_ratio
     assert bad.covariance[2, 2] > 10.0 * good.covariance[2, 2]

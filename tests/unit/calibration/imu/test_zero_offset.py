@@ -19,7 +19,7 @@ def test_the_mean_of_a_rest_is_within_its_own_sigma_over_seeds():
     for seed in range(40):
         t, readings, warmth = a_rest(seed=seed)
         found = zero_offset(t, readings, warmth)
-        ratio.append((found.mean - OFFSET) / found.std)
+        ratio.append((found.mean - OFFSET) / found.mean_sigma)
         assert not found.disturbances
     assert 0.6 < np.std(ratio) < 1.2
 

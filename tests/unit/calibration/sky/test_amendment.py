@@ -10,8 +10,8 @@ from groundstation.star_tracking.sky_change import Change, SkyChange
 NAMES = ("0", "1", "2", "3", "n5")
 
 
-def say(change, star="", x=1.0, y=2.0, std=1e-4, sightings=100):
-    return SkyChange(change, star, x, y, (std**2, 0.0, std**2), sightings)
+def say(change, star="", x=1.0, y=2.0, sigma=1e-4, sightings=100):
+    return SkyChange(change, star, x, y, (sigma**2, 0.0, sigma**2), sightings)
 
 
 def summed(*found, min_sightings=50):
@@ -54,11 +54,11 @@ def test_a_light_is_added_once_with_its_best_place_and_a_number_of_its_own():
 
 def test_two_finders_are_averaged_by_their_covariances():
     (star,) = summed(
-        ("alpha", say(Change.APPEARED, x=4.0, std=1e-4)),
-        ("bravo", say(Change.APPEARED, x=4.001, std=2e-4)),
+        ("alpha", say(Change.APPEARED, x=4.0, sigma=1e-4)),
+        ("bravo", say(Change.APPEARED, x=4.001, sigma=2e-4)),
     ).added
     assert star.x_m == pytest.approx(4.0002)
-    assert star.std_x_m == pytest.approx(1e-4 * math.sqrt(0.8))
+    assert star.sigma_x_m == pytest.approx(1e-4 * math.sqrt(0.8))
     assert star.times_seen == 200
 
 

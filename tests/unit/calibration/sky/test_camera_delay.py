@@ -27,9 +27,9 @@ def test_delay_and_gyro_bias_are_found_within_their_spread():
     for _ in range(30):
         found = camera_delay(*recording(rng), guess_s=0.05)
         assert found.gyro_bias_rad_s == pytest.approx(0.004, abs=5e-4)  # sum of 26 s: 1.2e-4
-        ratios.append((found.delay_s - 0.087) / found.std_s)
+        ratios.append((found.delay_s - 0.087) / found.sigma_s)
     assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.35
-    assert found.std_s < 2e-3
+    assert found.sigma_s < 2e-3
 
 
 def test_wrong_headings_are_left_out():

@@ -46,8 +46,8 @@ def delay_file(measured, tmp_path):
 
 def test_delay_and_jitter_are_found_from_a_guess_far_off(measured):
     delay, jitter = measured.quantities["delay"], measured.quantities["jitter"]
-    assert delay.value == pytest.approx(DELAY_S, abs=4 * delay.std)
-    assert delay.std < 1e-3
+    assert delay.value == pytest.approx(DELAY_S, abs=4 * delay.sigma)
+    assert delay.sigma < 1e-3
     assert jitter.value == pytest.approx(JITTER_S, rel=0.2)
     assert len(measured.draw().axes) == 2
 
@@ -57,13 +57,13 @@ def test_the_rig_hands_the_measured_delay_to_the_stamps_and_its_spread_to_fusion
     text = text.replace("delay_s = 0.015\ndelay_sigma_s = 0.001", f'delay_file = "{delay_file.name}"', 1)
     rig = parse_rig(text, delay_file.with_name("rig.toml"))
     delay, jitter = measured.quantities["delay"], measured.quantities["jitter"]
-    sigma_s = math.hypot(delay.std, jitter.value)
+    sigma_s = math.hypot(delay.sigma, jitter.value)
     camera = rig.of_type("alpha", StarsOfType).star_camera
     assert camera.delay == pytest.approx((delay.value, sigma_s), rel=1e-6)
     fusion = make_node(rig, "alpha/fusion")
     assert fusion._estimator.noise.fix_delay_sigma_s == camera.delay[1]
     tracker = make_node(rig, "alpha/star_tracker")
-    assert (tracker._delay.delay_s, tracker._delay.delay_std_s) == camera.delay
+    assert (tracker._delay.delay_s, tracker._delay.delay_sigma_s) == camera.delay
 
 
 @pytest.mark.parametrize(

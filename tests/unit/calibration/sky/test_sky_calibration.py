@@ -20,9 +20,11 @@ def pictures(painter, rng, poses, sigma_px=0.02):
         seen = rng.permutation(painter.visible(pose))
         uv = painter.project(*pose)[seen] + rng.normal(0.0, sigma_px, (len(seen), 2))
         n = len(uv)
-        cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+        covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
         made.append(
-            Spots(uv[:, 0], uv[:, 1], np.linspace(9, 3, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+            Spots(
+                uv[:, 0], uv[:, 1], np.linspace(9, 3, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+            )
         )
     return made
 
@@ -40,7 +42,7 @@ def test_a_wrong_lens_without_distortion_is_put_right_by_the_stars(painter, cata
     wrong = dataclasses.replace(
         camera, fx=580.0, fy=580.0, cx=319.5, cy=239.5, distortion=(0.0, 0.0, 0.0, 0.0, 0.0)
     )
-    found = calibrate_intrinsics(seen, catalogue, wrong, wobble_std_m=5e-5)
+    found = calibrate_intrinsics(seen, catalogue, wrong, wobble_sigma_m=5e-5)
     assert len(found.solved) == 24
     assert found.adjusted.rms_px < 0.03
     assert found.camera.fx == pytest.approx(camera.fx, abs=0.1)
@@ -66,7 +68,7 @@ def test_the_mount_comes_from_turning_in_place_and_its_yaw_from_one_heading(pain
         mount_tilt_y_rad=0.0,
         ceiling_height_above_camera_m=2.25,
     )
-    found = calibrate_mount(seen, catalogue, wrong, wobble_std_m=5e-5, first_heading_rad=0.4).camera
+    found = calibrate_mount(seen, catalogue, wrong, wobble_sigma_m=5e-5, first_heading_rad=0.4).camera
     assert found.mount_yaw_rad == pytest.approx(camera.mount_yaw_rad, abs=2e-3)
     assert found.mount_offset_body_m[:2] == pytest.approx(camera.mount_offset_body_m[:2], abs=5e-4)
     assert np.allclose(found.body_from_camera(), camera.body_from_camera(), atol=2e-3)

@@ -27,8 +27,10 @@ def picture(painter, rng, pose):
     seen = rng.permutation(painter.visible(pose))
     uv = painter.project(*pose)[seen] + rng.normal(0.0, SIGMA_PX, (len(seen), 2))
     n = len(uv)
-    cov = np.tile([SIGMA_PX**2, 0.0, SIGMA_PX**2], (n, 1))
-    spots = Spots(uv[:, 0], uv[:, 1], np.linspace(9, 3, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    covariance = np.tile([SIGMA_PX**2, 0.0, SIGMA_PX**2], (n, 1))
+    spots = Spots(
+        uv[:, 0], uv[:, 1], np.linspace(9, 3, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+    )
     return spots, seen
 
 

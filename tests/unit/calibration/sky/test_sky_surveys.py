@@ -21,8 +21,10 @@ from groundstation.star_tracking.detection import Spots
 
 def spots_at(uv, sigma_px):
     n = len(uv)
-    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
-    return Spots(uv[:, 0], uv[:, 1], np.linspace(900, 300, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    return Spots(
+        uv[:, 0], uv[:, 1], np.linspace(900, 300, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+    )
 
 
 def sweep(painter, rng, sigma_px=0.03, drop=0.05, lights=2):
@@ -69,7 +71,7 @@ def test_a_sweep_gives_the_shape_of_the_sky_and_says_how_well(painter, camera):
     factor = ((goal - goal.mean()) * np.conj(centred)).sum() / (np.abs(centred) ** 2).sum()
     error = factor * centred - (goal - goal.mean())
     assert np.sqrt(np.mean(np.abs(error) ** 2)) < 1.5e-4
-    normalised = np.column_stack((error.real, error.imag)) / sky.std_m[real]
+    normalised = np.column_stack((error.real, error.imag)) / sky.sigma_m[real]
     assert 0.75 < np.sqrt(np.mean(normalised**2)) < 1.3
     assert sky.camera.ceiling_height_above_camera_m == pytest.approx(2.3, rel=2e-3)
     assert {"a3", "a16", "a30"} <= set(sky.ids)
@@ -135,7 +137,7 @@ def test_turning_in_place_gives_the_mount_s_offset_and_tilt(painter, camera):
     assert found.camera.mount_tilt_y_rad == pytest.approx(camera.mount_tilt_y_rad, abs=2e-4)
     for name, true in (("mount_tilt_x_rad", camera.mount_tilt_x_rad), ("mount_offset_x_m", 0.02)):
         value = found.camera.mount_tilt_x_rad if "tilt" in name else found.camera.mount_offset_body_m[0]
-        assert abs(value - true) < 4 * found.std_camera[name]
+        assert abs(value - true) < 4 * found.sigma_camera[name]
 
 
 def test_our_projection_is_opencv_s(painter, camera):

@@ -11,8 +11,10 @@ from groundstation.star_tracking.detection import Spots
 
 def spots_at(uv, sigma_px=0.03):
     n = len(uv)
-    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
-    return Spots(uv[:, 0], uv[:, 1], np.linspace(900, 300, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    return Spots(
+        uv[:, 0], uv[:, 1], np.linspace(900, 300, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+    )
 
 
 def look(painter, rng, pose, stars=None):

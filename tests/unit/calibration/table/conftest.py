@@ -67,9 +67,9 @@ def fly(
     c, s = np.cos(heading), np.sin(heading)
     body = np.column_stack([c * felt[:, 0] + s * felt[:, 1], c * felt[:, 1] - s * felt[:, 0]])
     arm = np.array([0.03, -0.02])
-    omega = np.gradient(heading, fine)
-    alpha = np.gradient(omega, fine)
-    body += np.column_stack([-alpha * arm[1] - omega**2 * arm[0], alpha * arm[0] - omega**2 * arm[1]])
+    rate = np.gradient(heading, fine)
+    alpha = np.gradient(rate, fine)
+    body += np.column_stack([-alpha * arm[1] - rate**2 * arm[0], alpha * arm[0] - rate**2 * arm[1]])
     bias = rng.normal(0.0, 0.03, 2)
     density = 6.5e-5
     packets = body[:-1].reshape(-1, 4, 2).mean(axis=1) * 0.5 + body[1:].reshape(-1, 4, 2).mean(axis=1) * 0.5

@@ -43,13 +43,13 @@ def test_errors_of_the_map_are_as_large_as_it_says(made_table_of, fly):
         table = made_table_of(rng)
         fit = learn(fly(table, rng, laps=2, fix_sigma_m=1e-3, fix_rate_hz=2.0))
         error = (fit.acceleration_m_s2(places) - table.pull(places)).ravel()
-        cov = fit.covariance(places)
-        values, vectors = np.linalg.eigh(cov)
+        covariance = fit.covariance(places)
+        values, vectors = np.linalg.eigh(covariance)
         loud = values > 1e-4 * values[-1]
         squares.append(float(((vectors.T @ error)[loud] ** 2 / values[loud]).mean()))
-        mean, mean_cov = fit.mean_over(places)
+        mean, mean_covariance = fit.mean_over(places)
         off = mean - table.pull(places).mean(axis=0)
-        mean_squares.append(float(off @ np.linalg.solve(mean_cov, off)) / 2.0)
+        mean_squares.append(float(off @ np.linalg.solve(mean_covariance, off)) / 2.0)
     assert 0.5 < np.mean(squares) < 1.5
     assert 0.1 < np.mean(mean_squares) < 2.5
 
@@ -57,10 +57,10 @@ def test_errors_of_the_map_are_as_large_as_it_says(made_table_of, fly):
 def test_what_was_never_visited_is_as_uncertain_as_before(made_table, fly):
     log = fly(made_table, np.random.default_rng(2), laps=1)
     fit = learn(log)
-    visited = fit.std_m_s2(log.position_table_m[1000::500])
+    visited = fit.sigma_m_s2(log.position_table_m[1000::500])
     basis = SurfaceBasis.over((-1.5, 4.0, -1.0, 3.0), 0.5)
     wide = fit_surface([flight_equations(log, basis, PRIORS)], basis)
-    far = wide.std_m_s2(np.array([[3.8, 2.8], [3.5, 2.5]]))
+    far = wide.sigma_m_s2(np.array([[3.8, 2.8], [3.5, 2.5]]))
     assert visited.max() < 0.4 * fit.waviness_m_s2
     assert far.min() > 0.8 * wide.waviness_m_s2
 
@@ -73,14 +73,14 @@ def test_bias_and_slope_are_not_told_apart_without_turning(made_table, fly):
     assert straight.correlation > 0.99
     assert "straight: the heading turned through only 0°" in straight.sentence()
     assert turning.is_separated
-    assert max(turning.pull_std_m_s2) < 0.1 * max(straight.pull_std_m_s2)
+    assert max(turning.pull_sigma_m_s2) < 0.1 * max(straight.pull_sigma_m_s2)
     assert "are separated" in turning.sentence()
 
 
 def test_a_flight_that_says_nothing_is_not_called_separated(made_table, fly):
     log = fly(made_table, np.random.default_rng(4), laps=1)
     few = log.fix_s < 3.0
-    names = ("fix_s", "fix_position_m", "fix_cov_m2", "fix_heading_rad", "fix_velocity_m_s")
+    names = ("fix_s", "fix_position_m", "fix_covariance_m2", "fix_heading_rad", "fix_velocity_m_s")
     short = dataclasses.replace(log, rests_s=(), **{name: getattr(log, name)[few] for name in names})
     verdict = separability(learn(short))[0]
     assert not verdict.is_separated
@@ -107,19 +107,19 @@ def test_a_map_shrinks_the_error_of_an_outage_on_a_fresh_lap(made_table, fly):
 
 def test_noise_that_was_told_too_small_is_found_out(made_table, fly):
     log = fly(made_table, np.random.default_rng(9))
-    told = dataclasses.replace(log, fix_cov_m2=log.fix_cov_m2 / 9.0)
+    told = dataclasses.replace(log, fix_covariance_m2=log.fix_covariance_m2 / 9.0)
     fit, boasting = learn(log), learn(told)
     assert fit.chi_square_ratio == pytest.approx(1.0, abs=0.1)
     assert 5.0 < boasting.chi_square_ratio < 10.0
     place = np.array([[0.0, 0.0]])
-    assert boasting.std_m_s2(place)[0, 0] > 0.6 * fit.std_m_s2(place)[0, 0]
+    assert boasting.sigma_m_s2(place)[0, 0] > 0.6 * fit.sigma_m_s2(place)[0, 0]
 
 
 def test_two_flights_know_more_than_one(made_table, fly):
     rng = np.random.default_rng(10)
     first, second = fly(made_table, rng), fly(made_table, rng)
     places = grid_of(1.0, 0.6)
-    assert learn(first, second).std_m_s2(places).mean() < 0.9 * learn(first).std_m_s2(places).mean()
+    assert learn(first, second).sigma_m_s2(places).mean() < 0.9 * learn(first).sigma_m_s2(places).mean()
 
 
 def test_modes_pull_along_the_gradient_of_their_potential():
@@ -143,7 +143,7 @@ def test_a_flight_with_hardly_any_fixes_is_refused(made_table, fly):
     log = fly(made_table, np.random.default_rng(1), laps=1)
     few = dataclasses.replace(
         log, **{name: getattr(log, name)[:4] for name in (
-            "fix_s", "fix_position_m", "fix_cov_m2", "fix_heading_rad", "fix_velocity_m_s")},
+            "fix_s", "fix_position_m", "fix_covariance_m2", "fix_heading_rad", "fix_velocity_m_s")},
     )  # fmt: skip
     with pytest.raises(ValueError, match="lap has 4 fixes"):
         flight_equations(few, BASIS, PRIORS)

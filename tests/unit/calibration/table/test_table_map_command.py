@@ -34,8 +34,8 @@ def folder(tmp_path, made_table, fly):
     path = tmp_path / "laps"
     path.mkdir()
     (path / "meta.json").write_text(json.dumps({"known": KNOWN}))
-    omega = np.gradient(log.heading_rad, log.end_s) + 0.004 + rng.normal(0.0, 4e-4, len(log.end_s))
-    imu = np.column_stack([log.end_s, omega, log.force_body_m_s2, np.full(len(omega), 25.0)])
+    rate = np.gradient(log.heading_rad, log.end_s) + 0.004 + rng.normal(0.0, 4e-4, len(log.end_s))
+    imu = np.column_stack([log.end_s, rate, log.force_body_m_s2, np.full(len(rate), 25.0)])
     imu[1000, 2] += 0.4  # a wild packet
     imu = np.delete(imu, [3000, 5000, 5001, 5002], axis=0)
     np.savetxt(
@@ -80,9 +80,9 @@ def test_a_folder_becomes_a_map_a_picture_and_advice(run, folder, tmp_path, made
     places = rng.uniform((-1.1, -0.7), (1.1, 0.7), (100, 2))
     truth = made_table.pull(places)
     error = made.accelerations_m_s2(places) - truth
-    std = np.array([made.std_m_s2(x, y) for x, y in places.tolist()])
+    sigma = np.array([made.sigma_m_s2(x, y) for x, y in places.tolist()])
     assert (error**2).mean() < 0.15 * truth.var(axis=0).mean()
-    assert 0.1 < (error**2 / std**2).mean() < 1.5
+    assert 0.1 < (error**2 / sigma**2).mean() < 1.5
     assert plot.read_bytes().startswith(b"\x89PNG")
     said = tomllib.loads(out.read_text())
     assert said["recordings"][0]["name"] == "laps"

@@ -27,9 +27,9 @@ BASIS = SurfaceBasis.over((-1.5, 1.5, -1.0, 1.0), 0.6)
 def plain_map(slope=(0.0, 0.0)):
     """A map of the pull slope[0] * x, slope[1] * y over 2 m x 1 m."""
     x, y = np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-0.5, 0.5, 11))
-    std = np.full(x.shape, 1e-4)
+    sigma = np.full(x.shape, 1e-4)
     return TableMap(
-        -1.0, -0.5, 0.1, slope[0] * x, slope[1] * y, std, 2.0 * std, 0.0 * x, (3e-3, -1e-3),
+        -1.0, -0.5, 0.1, slope[0] * x, slope[1] * y, sigma, 2.0 * sigma, 0.0 * x, (3e-3, -1e-3),
         np.eye(2) * 1e-9, 5e-4, SAID,
     )  # fmt: skip
 
@@ -43,14 +43,14 @@ def test_a_linear_pull_is_read_back_anywhere(x_m, y_m):
 @given(st.floats(allow_nan=True, allow_infinity=True), st.floats(allow_nan=True, allow_infinity=True))
 def test_any_place_gets_finite_numbers(x_m, y_m):
     made = plain_map((1e-3, 1e-3))
-    assert np.isfinite([*made.acceleration_m_s2(x_m, y_m), *made.std_m_s2(x_m, y_m)]).all()
+    assert np.isfinite([*made.acceleration_m_s2(x_m, y_m), *made.sigma_m_s2(x_m, y_m)]).all()
 
 
 def test_off_the_table_the_mean_slope_holds_with_its_larger_sigma():
     made = plain_map()
     assert made.acceleration_m_s2(1.01, 0.0) == (3e-3, -1e-3)
-    assert made.std_m_s2(0.0, -0.6) == (5e-4, 5e-4)
-    assert made.std_m_s2(0.0, 0.0) == pytest.approx((1e-4, 2e-4))
+    assert made.sigma_m_s2(0.0, -0.6) == (5e-4, 5e-4)
+    assert made.sigma_m_s2(0.0, 0.0) == pytest.approx((1e-4, 2e-4))
 
 
 def test_the_mean_gradient_is_uphill():
@@ -69,8 +69,8 @@ def test_the_grid_follows_the_fit(learned):
     places = rng.uniform((-1.5, -1.0), (1.5, 1.0), (200, 2))
     fit = learned.acceleration_m_s2(places)
     assert made.accelerations_m_s2(places) == pytest.approx(fit, abs=0.03 * fit.std())
-    std = np.array([made.std_m_s2(x, y) for x, y in places.tolist()])
-    assert std == pytest.approx(learned.std_m_s2(places), rel=0.08)
+    sigma = np.array([made.sigma_m_s2(x, y) for x, y in places.tolist()])
+    assert sigma == pytest.approx(learned.sigma_m_s2(places), rel=0.08)
     assert made.mean_m_s2 == pytest.approx(made.accelerations_m_s2(places * 0.99).mean(axis=0), abs=1e-4)
 
 
@@ -87,10 +87,10 @@ def test_a_saved_map_is_read_back(learned, tmp_path):
     made = map_of(learned, SAID)
     made.save(tmp_path / "table_map.toml")
     back = TableMap.load(tmp_path / "table_map.toml")
-    for name in ("ax_m_s2", "ay_m_s2", "std_x_m_s2", "std_y_m_s2", "height_m"):
+    for name in ("ax_m_s2", "ay_m_s2", "sigma_x_m_s2", "sigma_y_m_s2", "height_m"):
         assert (getattr(back, name) == getattr(made, name)).all()
     assert back.mean_m_s2 == pytest.approx(made.mean_m_s2)
-    assert back.mean_cov_m2_s4 == pytest.approx(made.mean_cov_m2_s4)
+    assert back.mean_covariance_m2_s4 == pytest.approx(made.mean_covariance_m2_s4)
     assert back.acceleration_m_s2(0.3, 0.2) == pytest.approx(made.acceleration_m_s2(0.3, 0.2))
     assert back.provenance == SAID
     assert sorted(path.name for path in tmp_path.iterdir()) == ["table_map.npz", "table_map.toml"]
@@ -136,6 +136,6 @@ def test_a_map_with_numbers_missing_is_refused():
     hole[1, 1] = np.nan
     with pytest.raises(ValueError, match="ax_m_s2 holds a number that is not finite"):
         TableMap(
-            -1.0, -0.5, 0.1, hole, made.ay_m_s2, made.std_x_m_s2, made.std_y_m_s2, made.height_m, (0.0, 0.0),
-            np.eye(2), 1e-4, SAID,
+            -1.0, -0.5, 0.1, hole, made.ay_m_s2, made.sigma_x_m_s2, made.sigma_y_m_s2, made.height_m,
+            (0.0, 0.0), np.eye(2), 1e-4, SAID,
         )  # fmt: skip

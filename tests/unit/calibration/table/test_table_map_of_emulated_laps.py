@@ -61,9 +61,9 @@ def test_the_map_of_emulated_laps_is_the_emulated_table(tmp_path, fly_laps):
     assert 0.3 < ((vectors.T @ off)[loud] ** 2 / values[loud]).mean() < 2.0
 
     # the mean over the table within its sigma
-    mean, cov = fit.mean_over(grid)
+    mean, covariance = fit.mean_over(grid)
     wrong = mean - truth_at(grid).mean(axis=0)
-    assert wrong @ np.linalg.solve(cov, wrong) < 12.0
+    assert wrong @ np.linalg.solve(covariance, wrong) < 12.0
 
     # worth something on a lap it has not seen
     there = fresh.position_table_m[2000::200]

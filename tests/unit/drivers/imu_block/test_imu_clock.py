@@ -104,7 +104,7 @@ class Flight:
     stamps: list
     clock: TickClock
     error_s: np.ndarray
-    std_s: np.ndarray
+    sigma_s: np.ndarray
     locked_from: int
 
 
@@ -122,8 +122,8 @@ def fly(*links, timer_s=None):
                 locked_from = len(stamps)
     truth = np.concatenate([each.truth_ns for each in links])[: len(stamps)]
     got = np.array([stamp.stamp_ns for stamp in stamps], dtype=float)
-    std = np.array([stamp.stamp_std_s for stamp in stamps])
-    return Flight(stamps, clock, (got - truth) * 1e-9, std, locked_from or len(stamps))
+    sigma = np.array([stamp.stamp_sigma_s for stamp in stamps])
+    return Flight(stamps, clock, (got - truth) * 1e-9, sigma, locked_from or len(stamps))
 
 
 def assert_stamps_keep_their_promises(flight):
@@ -133,7 +133,7 @@ def assert_stamps_keep_their_promises(flight):
     ticks = np.array([stamp.elapsed_ticks for stamp in flight.stamps[1:]])
     ratio = steps[flight.locked_from :] / (ticks[flight.locked_from :] * 1e6)
     assert np.abs(ratio - 1).max() <= 500.001e-6
-    assert (np.abs(flight.error_s) / flight.std_s).max() < 2.5
+    assert (np.abs(flight.error_s) / flight.sigma_s).max() < 2.5
 
 
 @pytest.mark.parametrize("drift", [-100e-6, -20e-6, 20e-6, 100e-6])
@@ -152,7 +152,7 @@ def test_stamps_are_right_to_under_a_millisecond_where_the_link_lets_them(link, 
     flight = fly(Link(**{**vars(link), "drift": drift, "start_ns": 7_500_000_000}))
     assert_stamps_keep_their_promises(flight)
     assert np.abs(flight.error_s[flight.locked_from :]).max() < limit_s
-    assert flight.std_s[-1] < 0.001
+    assert flight.sigma_s[-1] < 0.001
     assert abs(flight.clock.drift_ratio - drift) < 20e-6
 
 
@@ -161,7 +161,7 @@ def test_a_slow_v1_stream_states_the_delay_that_no_host_can_see(baud):
     flight = fly(Link(version=1, sample_count=8, baud=baud))
     assert_stamps_keep_their_promises(flight)
     settled = flight.error_s[flight.locked_from :]
-    assert 0.002 < flight.std_s[-1] < 0.004
+    assert 0.002 < flight.sigma_s[-1] < 0.004
     assert np.std(settled) < 0.0002  # constant, so the camera-delay calibration can remove it
 
 
@@ -220,7 +220,7 @@ def test_a_restarted_block_begins_a_new_epoch_and_stamps_stay_monotone(version, 
     assert (steps > 0).all()
     restarts = [stamp for stamp in flight.stamps[1:] if stamp.elapsed_ticks is None]
     assert len(restarts) == 1
-    assert abs(flight.error_s[-1]) < 2.5 * flight.std_s[-1]
+    assert abs(flight.error_s[-1]) < 2.5 * flight.sigma_s[-1]
 
 
 def test_replies_between_frames_do_not_pull_the_clock():

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.star_camera.camera_frame import CameraFrame
 from drivers.star_camera.exposure import ExposureDelay
-from drivers.star_camera.frame import CameraFrame
 from drivers.star_camera.multipart import PartParser, boundary_of
 from drivers.star_camera.picture import decode_picture, to_mono
 
@@ -178,10 +178,10 @@ def test_a_grey_picture_of_a_colour_camera_is_refused():
 
 
 def test_the_exposure_lies_its_delay_before_the_arrival():
-    delay = ExposureDelay(delay_s=0.0625, delay_std_s=0.002)
+    delay = ExposureDelay(delay_s=0.0625, delay_sigma_s=0.002)
     assert delay.middle_ns(1_000_000_000) == 937_500_000
     for bad in (-0.1, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="delay_std_s"):
+        with pytest.raises(ValueError, match="delay_sigma_s"):
             ExposureDelay(0.0, bad)
         with pytest.raises(ValueError, match="delay_s"):
             ExposureDelay(bad, 0.0)

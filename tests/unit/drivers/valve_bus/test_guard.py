@@ -160,12 +160,14 @@ def test_the_newest_pulse_of_one_tick_wins(flying):
 
 def test_commands_for_others_and_malformed_ones_are_refused(flying):
     guard = flying.guard
+    before = guard.counters.commands
     assert guard.update(0, ValveCommand(2, 3, 3, ONE)) is Verdict.OTHER_VEHICLE
     bad = [(16, 0, ONE), (0, 16, ONE), (-1, 0, ONE), (0, -1, ONE), (0, 0, ONE[:7]), (0, 0, (128, *ONE[1:]))]
     bad += [(0, 0, (-1, *ONE[1:])), (0, 0, (1.5, *ONE[1:]))]
     for counter, pulse_id, times in bad:
         assert guard.update(0, ValveCommand(1, counter, pulse_id, times)) is Verdict.MALFORMED
     assert guard.counters.malformed == len(bad)
+    assert guard.counters.commands - before == 1 + len(bad)
     assert guard.counters.other_vehicle == 1
 
 

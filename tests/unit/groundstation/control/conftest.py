@@ -32,10 +32,10 @@ class World:
     latency_s: float = 0.040  # state age when the controller reads it
     fix_period_s: float = 0.65  # star tracker busy 0.6 s per frame
     fix_delay_s: float = 0.6
-    fix_std_m: float = 0.001
-    fix_std_rad: float = math.radians(0.05)
-    speed_std_m_s: float = 0.0015  # velocity error of the fusion between fixes
-    rate_noise_std_rad_s: float = math.radians(0.79)  # ADIS16100 behind its 40 Hz filter
+    fix_sigma_m: float = 0.001
+    fix_sigma_rad: float = math.radians(0.05)
+    speed_sigma_m_s: float = 0.0015  # velocity error of the fusion between fixes
+    rate_noise_sigma_rad_s: float = math.radians(0.79)  # ADIS16100 behind its 40 Hz filter
     rate_noise_pole_rad_s: float = 2 * math.pi * 40.0
 
 
@@ -78,13 +78,19 @@ class Estimator:
 
     def _draw(self) -> np.ndarray:
         world = self._world
-        std = (world.fix_std_m, world.fix_std_m, world.fix_std_rad, world.speed_std_m_s, world.speed_std_m_s)
-        return self._rng.normal(0.0, std)
+        sigma = (
+            world.fix_sigma_m,
+            world.fix_sigma_m,
+            world.fix_sigma_rad,
+            world.speed_sigma_m_s,
+            world.speed_sigma_m_s,
+        )
+        return self._rng.normal(0.0, sigma)
 
     def advance(self, now_s: float, steps: int) -> None:
         world = self._world
         pole = math.exp(-world.rate_noise_pole_rad_s * STEP_S)
-        drive = self._rng.normal(0.0, world.rate_noise_std_rad_s * math.sqrt(1 - pole**2), steps)
+        drive = self._rng.normal(0.0, world.rate_noise_sigma_rad_s * math.sqrt(1 - pole**2), steps)
         for value in drive.tolist():
             self._rate_noise = pole * self._rate_noise + value
             self._heading_walk.append(self._heading_walk[-1] + self._rate_noise * STEP_S)

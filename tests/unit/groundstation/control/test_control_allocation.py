@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from groundstation.control.allocation import MAX_VALVES, Allocator
-from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.state import Wrench
+from groundstation.control.state import BodyWrench
 from groundstation.control.vehicle import Valve, VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 SQUARE = VehicleModel(11.0, 0.25, square_of_eight())
 # six valves in three tangential pairs at 120 degrees, of unlike thrust: no symmetry to lean on
@@ -29,7 +29,7 @@ HEXAGON = VehicleModel(
     ),
 )
 ALLOCATORS = [Allocator(SQUARE), Allocator(HEXAGON)]
-demands = st.builds(Wrench, st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), st.floats(-0.2, 0.2))
+demands = st.builds(BodyWrench, st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), st.floats(-0.2, 0.2))
 
 
 def made(allocator, duty):
@@ -66,14 +66,14 @@ def test_no_plan_burns_less_than_the_allocated_one(allocator):
     """Authority: scipy's HiGHS solver on the same programme."""
     rng = np.random.default_rng(7)
     for _ in range(150):
-        demand = Wrench(tuple(rng.normal(0.0, 0.2, 2)), rng.normal(0.0, 0.04))
+        demand = BodyWrench(tuple(rng.normal(0.0, 0.2, 2)), rng.normal(0.0, 0.04))
         # a little inside, where the solver's feasibility tolerance does not matter
         inside = 0.999 * vector(allocator.envelope.saturate(demand))
         count = allocator.effectiveness.shape[1]
         best = linprog(np.ones(count), A_eq=allocator.effectiveness, b_eq=inside, bounds=(0.0, 1.0))
         assert best.status == 0
         for sparse in (False, True):
-            duty = allocator.allocate(Wrench((inside[0], inside[1]), inside[2]), sparse=sparse)
+            duty = allocator.allocate(BodyWrench((inside[0], inside[1]), inside[2]), sparse=sparse)
             assert duty.sum() == pytest.approx(best.fun, abs=1e-6)
 
 
@@ -83,17 +83,17 @@ def test_a_mirrored_demand_opens_the_mirrored_valves(demand):
     duty = allocator.allocate(demand)
     (force_x, force_y), torque = demand.force_body_n, demand.torque_nm
     # mirrored at the body x axis: valves at +y and -y, and pushes along +y and -y, change places
-    mirrored = allocator.allocate(Wrench((force_x, -force_y), -torque))
+    mirrored = allocator.allocate(BodyWrench((force_x, -force_y), -torque))
     assert mirrored[[1, 0, 3, 2, 6, 7, 4, 5]] == pytest.approx(duty, abs=1e-7)
 
 
 def test_a_sparse_plan_for_a_push_along_one_axis_uses_its_pair_only():
-    duty = ALLOCATORS[0].allocate(Wrench((0.1, 0.0), 0.0), sparse=True)
+    duty = ALLOCATORS[0].allocate(BodyWrench((0.1, 0.0), 0.0), sparse=True)
     assert np.flatnonzero(duty).tolist() == [0, 1]
 
 
 def test_a_pure_turn_is_shared_by_all_four_couples_or_given_to_one():
-    torque = Wrench((0.0, 0.0), 0.02)
+    torque = BodyWrench((0.0, 0.0), 0.02)
     assert np.count_nonzero(ALLOCATORS[0].allocate(torque)) == 4
     assert np.count_nonzero(ALLOCATORS[0].allocate(torque, sparse=True)) == 2
 
@@ -111,7 +111,7 @@ def test_saturation_keeps_the_direction_of_the_force_and_serves_torque_first(all
     if kept != demand:
         assert kept.torque_nm == pytest.approx(min(max(demand.torque_nm, -limit), limit))
         # and no force is given away: a thousandth more leaves the envelope
-        more = Wrench((kept.force_body_n[0] * 1.001, kept.force_body_n[1] * 1.001), kept.torque_nm)
+        more = BodyWrench((kept.force_body_n[0] * 1.001, kept.force_body_n[1] * 1.001), kept.torque_nm)
         whole = math.hypot(*kept.force_body_n) >= math.hypot(*demand.force_body_n) * (1 - 1e-9)
         assert whole or math.hypot(*kept.force_body_n) < 1e-6 or not envelope.contains(more)
 
@@ -120,11 +120,11 @@ def test_saturation_keeps_the_direction_of_the_force_and_serves_torque_first(all
 def test_whatever_valves_do_lies_in_the_envelope(duty):
     allocator = ALLOCATORS[0]
     force_x, force_y, torque = made(allocator, np.array(duty))
-    assert allocator.envelope.contains(Wrench((force_x, force_y), torque))
+    assert allocator.envelope.contains(BodyWrench((force_x, force_y), torque))
 
 
 def test_absurd_demands_are_made_finite():
-    duty = ALLOCATORS[0].allocate(Wrench((1e308, -1e308), 0.0))
+    duty = ALLOCATORS[0].allocate(BodyWrench((1e308, -1e308), 0.0))
     assert made(ALLOCATORS[0], duty) == pytest.approx((0.44, -0.44, 0.0), abs=1e-6)
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
 from groundstation.control.edge import edge_outlook
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.formation import Formation, FormationConfig, RelativePose
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import rectangle
 from groundstation.control.modulation import PulseConfig
 from groundstation.control.state import ControlState, Goal
 from groundstation.control.station import StationConfig, StationKeeping
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 HERE = Goal((0.0, 0.0), 0.3)
 SETTLED_S = 20.0
@@ -49,7 +49,7 @@ def test_on_a_level_table_holding_costs_less_than_the_noise_it_lives_with(fly, v
 
 
 def test_without_noise_the_mock_up_stands_still_within_one_pulse(fly, vehicle, world):
-    quiet = world(fix_std_m=0.0, fix_std_rad=0.0, speed_std_m_s=0.0, rate_noise_std_rad_s=0.0)
+    quiet = world(fix_sigma_m=0.0, fix_sigma_rad=0.0, speed_sigma_m_s=0.0, rate_noise_sigma_rad_s=0.0)
     flight = fly(station(vehicle), HERE, world=quiet, duration_s=120.0, start=(0.0, 0.0, 0.3))
     position_m, heading_rad, _ = flight.errors(HERE, 60.0)
     assert position_m < 0.0015  # inside the dead band

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from groundstation.control.envelope import WrenchEnvelope
-from groundstation.control.registry import controllers, make_controller
-from groundstation.control.state import ControlState, Goal, Wrench
+from groundstation.control.controllers import controllers, make_controller
+from groundstation.control.state import BodyWrench, ControlState, Goal
 from groundstation.control.vehicle import VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 VEHICLE = VehicleModel(11.0, 0.25, square_of_eight())
 ENVELOPE = WrenchEnvelope(VEHICLE)
@@ -20,7 +20,7 @@ anything = st.floats(allow_nan=False, allow_infinity=False)
 pairs = st.tuples(anything, anything)
 wild_states = st.builds(ControlState, pairs, pairs, anything, anything, pairs)
 wild_goals = st.builds(Goal, pairs, anything, pairs, anything, pairs, anything)
-wild_wrenches = st.none() | st.builds(Wrench, pairs, anything)
+wild_wrenches = st.none() | st.builds(BodyWrench, pairs, anything)
 spans = st.floats(1e-6, 1e6)
 
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
 from groundstation.control.edge import EdgeVerdict, edge_outlook
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.control.state import ControlState
 from groundstation.control.vehicle import VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 VEHICLE = VehicleModel(11.0, 0.25, square_of_eight())
 ENVELOPE = WrenchEnvelope(VEHICLE)

@@ -8,11 +8,11 @@ from pydantic import ValidationError
 
 from groundstation.control.allocation import Allocator
 from groundstation.control.modulation import MAX_ON_MS, PulseConfig, PulseModulator
-from groundstation.control.state import NO_WRENCH, Wrench
+from groundstation.control.state import NO_WRENCH, BodyWrench
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 
 ALLOCATOR = Allocator(VehicleModel(11.0, 0.25, square_of_eight()))
-demands = st.builds(Wrench, st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)), st.floats(-0.15, 0.15))
+demands = st.builds(BodyWrench, st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)), st.floats(-0.15, 0.15))
 
 
 def vector(wrench):
@@ -53,7 +53,7 @@ def test_no_pulse_is_shorter_than_a_valve_can_give_or_longer_than_the_wire_can_s
 @settings(max_examples=30)
 def test_on_average_the_demand_is_delivered(force, torque, period_s):
     modulator = PulseModulator(ALLOCATOR, PulseConfig(period_s=period_s))
-    demand, periods = Wrench(force, torque), 200
+    demand, periods = BodyWrench(force, torque), 200
     mean = sum(vector(modulator.update(demand).delivered) for _ in range(periods)) / periods
     # what may still be carried: three least pulses of 10 ms, spread over all periods
     carried = 3 * 0.010 * np.array((0.22, 0.22, 0.033)) / (periods * period_s)
@@ -63,7 +63,7 @@ def test_on_average_the_demand_is_delivered(force, torque, period_s):
 
 def test_demands_below_the_least_pulse_wait_until_they_are_worth_one():
     modulator = PulseModulator(ALLOCATOR, PulseConfig())
-    fired = [sum(modulator.update(Wrench((0.011, 0.0), 0.0)).on_time_ms) for _ in range(8)]
+    fired = [sum(modulator.update(BodyWrench((0.011, 0.0), 0.0)).on_time_ms) for _ in range(8)]
     assert fired[0] == 0
     assert any(fired)
     assert all(on == 0 or on >= 10 for on in fired)
@@ -72,14 +72,14 @@ def test_demands_below_the_least_pulse_wait_until_they_are_worth_one():
 def test_a_demand_that_changes_sign_burns_nothing():
     modulator = PulseModulator(ALLOCATOR, PulseConfig())
     for _ in range(20):
-        assert modulator.update(Wrench((0.015, 0.0), 0.0)).open_valve_s == 0.0
-        assert modulator.update(Wrench((-0.015, 0.0), 0.0)).open_valve_s == 0.0
+        assert modulator.update(BodyWrench((0.015, 0.0), 0.0)).open_valve_s == 0.0
+        assert modulator.update(BodyWrench((-0.015, 0.0), 0.0)).open_valve_s == 0.0
 
 
 def test_full_demand_leaves_no_gap_between_periods():
     modulator = PulseModulator(ALLOCATOR, PulseConfig(period_s=0.1))
     for _ in range(3):
-        pulses = modulator.update(Wrench((0.44, 0.0), 0.0))
+        pulses = modulator.update(BodyWrench((0.44, 0.0), 0.0))
         assert pulses.on_time_ms == (127, 127, 0, 0, 0, 0, 0, 0)
     assert pulses.delivered.force_body_n[0] == pytest.approx(0.44)
 
@@ -100,7 +100,7 @@ def test_the_delivered_wrench_is_what_slow_valves_really_give(sequence):
 def test_a_saturated_demand_is_not_remembered():
     modulator = PulseModulator(ALLOCATOR, PulseConfig())
     for _ in range(50):
-        modulator.update(Wrench((4.0, 0.0), 0.0))
+        modulator.update(BodyWrench((4.0, 0.0), 0.0))
     after = [modulator.update(NO_WRENCH).open_valve_s for _ in range(4)]
     # at most the closing delay of two valves and one carried rest
     assert sum(after) <= 2 * 0.005 + 3 * 0.010 * 2
@@ -109,10 +109,10 @@ def test_a_saturated_demand_is_not_remembered():
 
 def test_a_reset_forgets_the_carried_rest():
     modulator = PulseModulator(ALLOCATOR, PulseConfig())
-    modulator.update(Wrench((0.02, 0.0), 0.0))
+    modulator.update(BodyWrench((0.02, 0.0), 0.0))
     modulator.reset()
-    first = PulseModulator(ALLOCATOR, PulseConfig()).update(Wrench((0.02, 0.0), 0.0))
-    assert modulator.update(Wrench((0.02, 0.0), 0.0)) == first
+    first = PulseModulator(ALLOCATOR, PulseConfig()).update(BodyWrench((0.02, 0.0), 0.0))
+    assert modulator.update(BodyWrench((0.02, 0.0), 0.0)) == first
 
 
 def test_a_least_pulse_that_does_not_fit_the_period_is_refused():

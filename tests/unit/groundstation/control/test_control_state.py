@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.control.averaging import RateMean
-from groundstation.control.state import ControlState, Goal, Wrench, limit_length, rotate
+from groundstation.control.state import BodyWrench, ControlState, Goal, limit_length, rotate
 
 finite = st.floats(-1e6, 1e6)
 
@@ -35,7 +35,7 @@ def test_nothing_that_is_not_a_number_enters_or_leaves_a_controller(bad):
     with pytest.raises(ValueError, match="goal must be finite"):
         Goal((0.0, bad), 0.0)
     with pytest.raises(ValueError, match="wrench must be finite"):
-        Wrench((0.0, 0.0), bad)
+        BodyWrench((0.0, 0.0), bad)
 
 
 def test_the_mean_rate_goes_with_the_newest_pose():

@@ -99,5 +99,5 @@ def test_without_a_compiler_zig_makes_a_core_with_the_same_bits(hidden_compiler,
     for picture in pictures():
         one, two = ours.find(picture), zigs.find(picture)
         assert len(OracleDetector().find(picture)) == len(one) > 10
-        for name in ("u_px", "v_px", "flux_dn", "cov_px2", "elongation", "streak_px"):
+        for name in ("u_px", "v_px", "flux_dn", "covariance_px2", "elongation", "streak_px"):
             assert np.array_equal(getattr(one, name), getattr(two, name)), name

@@ -57,7 +57,7 @@ def test_a_star_list_may_come_from_a_spreadsheet(folder):
     text = path.read_text().replace(",", ";").replace(".", ",").replace("\n", "\r\n")
     found = StarCatalogue.parse(b"\xef\xbb\xbf" + text.encode(), Path("x"))
     assert found.ids == want.ids
-    for name in ("x_m", "y_m", "std_m"):
+    for name in ("x_m", "y_m", "sigma_m"):
         np.testing.assert_array_equal(getattr(found, name), getattr(want, name))
 
 

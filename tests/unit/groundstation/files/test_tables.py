@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.files.errors import FileError
-from groundstation.files.tables import csv_text, load_table, parse_table
+from groundstation.files.number_tables import csv_text, load_table, parse_table
 
 PATH = Path("table.csv")
 PLAIN = "id,x_m,y_m\n0,1.5,2\n1,-0.25,3e-1\n"

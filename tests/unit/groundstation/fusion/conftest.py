@@ -21,5 +21,5 @@ def noise() -> NoiseModel:
 
 
 @pytest.fixture
-def fix_cov(noise: NoiseModel) -> np.ndarray:
+def fix_covariance(noise: NoiseModel) -> np.ndarray:
     return np.diag([noise.star_sigma_xy_m**2] * 2 + [noise.star_sigma_heading_rad**2])

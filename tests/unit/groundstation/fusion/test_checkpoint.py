@@ -15,14 +15,14 @@ from groundstation.fusion.packet_history import PacketHistory
 def course(noise):
     history, rng = PacketHistory(), np.random.default_rng(3)
     for number in range(1, 301):
-        omega, ax, ay = rng.normal(0.0, (0.2, 0.02, 0.02))
-        history.rows.extend((0.01 * number, 0.01, omega, ax, ay, 0.0, 0.0))
+        rate, ax, ay = rng.normal(0.0, (0.2, 0.02, 0.02))
+        history.rows.extend((0.01 * number, 0.01, rate, ax, ay, 0.0, 0.0))
     return Course(noise, None, history, Counters())
 
 
 @pytest.fixture
-def begun(course, fix_cov):
-    fix = Fix(10_000_000, 20_000_000, 0.3, -0.2, 0.5, fix_cov)
+def begun(course, fix_covariance):
+    fix = Fix(10_000_000, 20_000_000, 0.3, -0.2, 0.5, fix_covariance)
     return course.begun(course.unknown(), fix, 0.01, 0.05)
 
 
@@ -30,11 +30,11 @@ def bits(checkpoint):
     return checkpoint.t_s, checkpoint.x.tobytes(), checkpoint.P.tobytes(), checkpoint.surface
 
 
-def test_a_checkpoint_is_never_changed(course, begun, fix_cov):
+def test_a_checkpoint_is_never_changed(course, begun, fix_covariance):
     before = bits(begun)
     later = course.carry(begun, 1.0)
     carried = bits(later)
-    fixed = course.correct(later, Fix(0, 0, 0.31, -0.2, 0.6, fix_cov))
+    fixed = course.correct(later, Fix(0, 0, 0.31, -0.2, 0.6, fix_covariance))
     assert fixed.correction.nis < 1e3
     course.rested(begun, 0.0)
     course.state_at(begun, 2.0, 1.0)
@@ -68,16 +68,16 @@ def test_standing_still_stops_the_motion_and_teaches_the_biases(course, noise, b
     assert quiet.P[es.GYRO_BIAS, es.GYRO_BIAS] < 0.1 * begun.P[es.GYRO_BIAS, es.GYRO_BIAS]
 
 
-def test_a_fix_outside_the_gate_leaves_state_and_covariance(course, begun, fix_cov, noise):
+def test_a_fix_outside_the_gate_leaves_state_and_covariance(course, begun, fix_covariance, noise):
     later = course.carry(begun, 1.0)
-    far = course.correct(later, Fix(0, 0, 9.0, 9.0, 0.0, fix_cov))
+    far = course.correct(later, Fix(0, 0, 9.0, 9.0, 0.0, fix_covariance))
     assert far.correction.nis > noise.gate_nis
     assert bits(far.checkpoint) == bits(later)
 
 
-def test_a_fix_that_agrees_makes_the_pose_more_certain(course, begun, fix_cov):
+def test_a_fix_that_agrees_makes_the_pose_more_certain(course, begun, fix_covariance):
     later = course.carry(begun, 1.0)
-    at_it = Fix(0, 0, *(later.x[es.PX : es.PY + 1]), float(later.x[es.THETA]), fix_cov)
+    at_it = Fix(0, 0, *(later.x[es.PX : es.PY + 1]), float(later.x[es.THETA]), fix_covariance)
     fixed = course.correct(later, at_it)
     assert fixed.checkpoint.P[es.PX, es.PX] < later.P[es.PX, es.PX]
     assert fixed.correction.K.shape == (len(later.x), 3)

@@ -32,9 +32,9 @@ def a_fix(t_ms: int, x: float = 0.0, y: float = 0.0, heading: float = 0.0, late_
     return Fix(t_ms * MS, (t_ms + late_ms) * MS, x, y, heading, COV)
 
 
-def packets(start_ms: int, stop_ms: int, omega=0.0, ax=0.0, ay=0.0):
+def packets(start_ms: int, stop_ms: int, rate=0.0, ax=0.0, ay=0.0):
     for t in range(start_ms + 10, stop_ms + 1, 10):
-        yield ImuPacket(t * MS, 0.01, omega, ax, ay, 25.0)
+        yield ImuPacket(t * MS, 0.01, rate, ax, ay, 25.0)
 
 
 def rested(noise: NoiseModel | None = None, seconds: int = 4) -> ErrorStateFilter:
@@ -84,7 +84,7 @@ def test_a_wrong_first_fix_does_not_bend_the_biases():
 def test_a_late_fix_gives_the_state_that_a_prompt_one_would_have_given(late_ms, turn):
     prompt, late = rested(seconds=2), rested(seconds=2)
     fix = Fix(2500 * MS, (2500 + late_ms) * MS, 0.003, -0.002, 0.5 * turn + 0.001, COV)
-    for p in packets(2000, 4000, omega=turn, ax=0.01, ay=-0.005):
+    for p in packets(2000, 4000, rate=turn, ax=0.01, ay=-0.005):
         for estimator, arrival in ((prompt, 2500), (late, 2500 + late_ms)):
             estimator.add_imu(p)
             if p.t_ns == arrival * MS:
@@ -105,15 +105,15 @@ def test_a_fix_ahead_of_the_packets_waits_for_them():
 def test_the_reported_state_is_the_centre_of_mass_in_a_spin():
     estimator = rested(a_noise(imu_offset_x_m=0.03, imu_offset_y_m=-0.02))
     # the accelerometers feel the pull towards the centre, which itself stands still
-    omega = 0.7
-    pull = (-(omega**2) * 0.03, omega**2 * 0.02)
-    alpha = omega / 0.5
+    rate = 0.7
+    pull = (-(rate**2) * 0.03, rate**2 * 0.02)
+    alpha = rate / 0.5
     spin_up = (-alpha * -0.02, alpha * 0.03)
     for k in range(50):
-        w = (k + 0.5) / 50 * omega
+        w = (k + 0.5) / 50 * rate
         felt = (spin_up[0] - w**2 * 0.03, spin_up[1] + w**2 * 0.02)
         estimator.add_imu(ImuPacket((4010 + 10 * k) * MS, 0.01, w, *felt, 25.0))
-    for p in packets(4500, 8500, omega, *pull):
+    for p in packets(4500, 8500, rate, *pull):
         state = estimator.add_imu(p)
     assert math.hypot(state.x_m, state.y_m) < 0.003
     assert math.hypot(state.vx_m_s, state.vy_m_s) < 0.002
@@ -207,4 +207,4 @@ def test_any_rates_of_packets_and_fixes_do(rate_hz, every_ms, late_ms):
             estimator.add_fix(a_fix(t - late_ms, *pose, late_ms=late_ms))
     state = estimator.state()
     assert math.hypot(state.x_m, state.y_m) < 4e-3
-    assert state.std_x_m < 2.5e-3
+    assert state.sigma_x_m < 2.5e-3

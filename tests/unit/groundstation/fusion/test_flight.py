@@ -14,9 +14,9 @@ def a_segment(rng: np.random.Generator, n: int = 67, holes: tuple[int, ...] = ()
     span = np.full(n, 0.01)
     span[0] = 0.004
     end = np.cumsum(span)
-    omega = 0.5 + rng.normal(0.0, 0.1, n)
+    rate = 0.5 + rng.normal(0.0, 0.1, n)
     force = rng.normal(0.0, 0.05, (2, n))
-    return Segment(end, span, omega, force[0], force[1], rng.normal(0.0, 1.0, n), is_hole, 0.0, end[-1])
+    return Segment(end, span, rate, force[0], force[1], rng.normal(0.0, 1.0, n), is_hole, 0.0, end[-1])
 
 
 def a_state(rng: np.random.Generator) -> np.ndarray:
@@ -41,7 +41,7 @@ def test_the_transition_is_the_derivative_of_the_flight(state):
 def test_a_flight_cut_in_two_arrives_where_the_whole_one_does():
     rng = np.random.default_rng(3)
     x, whole = a_state(rng), a_segment(rng)
-    columns = (whole.end_s, whole.span_s, whole.omega_rad_s, whole.ax_m_s2, whole.ay_m_s2, whole.warmth_k)
+    columns = (whole.end_s, whole.span_s, whole.rate_rad_s, whole.ax_m_s2, whole.ay_m_s2, whole.warmth_k)
     first = Segment(*(c[:30] for c in columns), whole.is_hole[:30], 0.0, whole.end_s[29])
     second = Segment(*(c[30:] for c in columns), whole.is_hole[30:], whole.end_s[29], whole.stop_s)
     y = x.copy()
@@ -75,7 +75,7 @@ def test_a_hole_while_valves_work_is_less_certain_than_a_quiet_one(noise):
     rng = np.random.default_rng(2)
     busy = a_segment(rng, holes=(30,))
     quiet = Segment(
-        busy.end_s, busy.span_s, busy.omega_rad_s, busy.ax_m_s2 * 0.01, busy.ay_m_s2 * 0.01, busy.warmth_k,
+        busy.end_s, busy.span_s, busy.rate_rad_s, busy.ax_m_s2 * 0.01, busy.ay_m_s2 * 0.01, busy.warmth_k,
         busy.is_hole, 0.0, busy.stop_s,
     )  # fmt: skip
     x = np.zeros(es.SIZE)

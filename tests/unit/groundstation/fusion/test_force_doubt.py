@@ -98,7 +98,7 @@ def flown(doubtful, seed, outage_from_s=4.0):
                 )
             )
     state = estimator.state()
-    return state.x_m - p, state.std_x_m, math.sqrt(estimator.covariance()[0, 0])
+    return state.x_m - p, state.sigma_x_m, math.sqrt(estimator.covariance()[0, 0])
 
 
 def test_reported_sigmas_hold_what_acted_unseen():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.fusion.estimators import ESTIMATORS
 from groundstation.fusion.flight_data import estimate
-from groundstation.fusion.registry import ESTIMATORS
 
 
 def errors(folder, method="filter"):

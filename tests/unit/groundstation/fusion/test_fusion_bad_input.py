@@ -15,13 +15,13 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def flying(noise, fix_cov):
+def flying(noise, fix_covariance):
     estimator = ErrorStateFilter(noise)
     estimator.begin_rest(0)
     for t in range(10, 3001, 10):
         estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
         if t in (1000, 2000):
-            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_cov))
+            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_covariance))
     estimator.end_rest(3000 * MS)
     return estimator
 
@@ -34,28 +34,28 @@ def test_duplicated_and_older_packets_are_refused_and_counted(flying):
     assert flying.state() == before
 
 
-def test_a_clock_that_jumped_back_for_good_is_followed(flying, fix_cov):
+def test_a_clock_that_jumped_back_for_good_is_followed(flying, fix_covariance):
     for t in range(100_010, 100_500, 10):
         flying.add_imu(ImuPacket(t * MS - 99_000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
     assert flying.counters.by_name["clock_jumped_back"] == 1
     state = flying.state()
     assert state.t_ns == 1490 * MS
-    assert flying.add_fix(Fix(1400 * MS, 1490 * MS, 0.001, 0.0, 0.0, fix_cov)).used
+    assert flying.add_fix(Fix(1400 * MS, 1490 * MS, 0.001, 0.0, 0.0, fix_covariance)).used
 
 
 def test_a_hole_is_bridged_and_widens_the_sigmas(flying):
-    narrow = flying.state().std_x_m
+    narrow = flying.state().sigma_x_m
     state = flying.add_imu(ImuPacket(3500 * MS, 0.5, 0.0, 0.0, 0.0, 25.0))
     assert flying.counters.by_name["packet_hole"] == 1
-    assert state.std_x_m > narrow
+    assert state.sigma_x_m > narrow
     assert math.hypot(state.x_m, state.y_m) < 0.01
 
 
-def test_a_long_hole_in_flight_is_called_lost_until_a_fix_agrees(flying, fix_cov):
+def test_a_long_hole_in_flight_is_called_lost_until_a_fix_agrees(flying, fix_covariance):
     state = flying.add_imu(ImuPacket(8000 * MS, 5.0, 0.0, 0.0, 0.0, 25.0))
     assert state.is_lost
     assert flying.counters.by_name["packets_missing_for_long"] == 1
-    assert flying.add_fix(Fix(8000 * MS, 8000 * MS, 0.0, 0.0, 0.0, fix_cov)).used
+    assert flying.add_fix(Fix(8000 * MS, 8000 * MS, 0.0, 0.0, 0.0, fix_covariance)).used
     assert not flying.add_imu(ImuPacket(8010 * MS, 0.01, 0.0, 0.0, 0.0, 25.0)).is_lost
 
 
@@ -65,32 +65,32 @@ def test_ticks_that_contradict_the_stamps_are_counted_and_the_stamps_win(flying)
     assert state.t_ns == 4000 * MS
 
 
-def test_a_fix_before_the_first_packet_is_refused(noise, fix_cov):
+def test_a_fix_before_the_first_packet_is_refused(noise, fix_covariance):
     estimator = ErrorStateFilter(noise)
-    assert estimator.add_fix(Fix(0, 0, 0.0, 0.0, 0.0, fix_cov)).reason == "before the first packet"
+    assert estimator.add_fix(Fix(0, 0, 0.0, 0.0, 0.0, fix_covariance)).reason == "before the first packet"
     estimator.add_imu(ImuPacket(5000 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
-    account = estimator.add_fix(Fix(100 * MS, 5000 * MS, 0.0, 0.0, 0.0, fix_cov))
+    account = estimator.add_fix(Fix(100 * MS, 5000 * MS, 0.0, 0.0, 0.0, fix_covariance))
     assert account.reason == "before the first packet"
     assert estimator.counters.by_name["fix_before_the_first_packet"] == 2
 
 
-def test_a_fix_out_of_order_is_refused(flying, fix_cov):
-    account = flying.add_fix(Fix(1000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_cov))
+def test_a_fix_out_of_order_is_refused(flying, fix_covariance):
+    account = flying.add_fix(Fix(1000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_covariance))
     assert account.reason == "older than the last used"
 
 
-def test_a_fix_from_the_future_is_refused(flying, fix_cov):
-    account = flying.add_fix(Fix(9000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_cov))
+def test_a_fix_from_the_future_is_refused(flying, fix_covariance):
+    account = flying.add_fix(Fix(9000 * MS, 3000 * MS, 0.0, 0.0, 0.0, fix_covariance))
     assert account.reason == "more than a second ahead of the packets"
 
 
-def test_a_block_without_thermometer_is_fine(noise, fix_cov):
+def test_a_block_without_thermometer_is_fine(noise, fix_covariance):
     estimator = ErrorStateFilter(noise)
     estimator.begin_rest(0)
     for t in range(10, 3001, 10):
         estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, math.nan))
         if t in (1000, 2000):
-            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_cov))
+            estimator.add_fix(Fix((t - 600) * MS, t * MS, 0.0, 0.0, 0.0, fix_covariance))
     assert np.isfinite(estimator.state()[1:13]).all()
 
 
@@ -110,19 +110,19 @@ def test_no_sequence_of_readings_makes_the_state_anything_but_finite(events):
         packet_period_s=0.01, gyro_density_rad_s_rthz=7e-5, acc_density_m_s2_rthz=6e-5,
         star_sigma_xy_m=1e-3, star_sigma_heading_rad=8.7e-4,
     )  # fmt: skip
-    cov = np.diag([1e-6, 1e-6, 7.6e-7])
+    covariance = np.diag([1e-6, 1e-6, 7.6e-7])
     estimator = ErrorStateFilter(noise)
     estimator.begin_rest(0)
     for t in range(10, 1501, 10):
         estimator.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
-    estimator.add_fix(Fix(300 * MS, 900 * MS, 0.0, 0.0, 0.0, cov))
-    estimator.add_fix(Fix(900 * MS, 1500 * MS, 0.0, 0.0, 0.0, cov))
+    estimator.add_fix(Fix(300 * MS, 900 * MS, 0.0, 0.0, 0.0, covariance))
+    estimator.add_fix(Fix(900 * MS, 1500 * MS, 0.0, 0.0, 0.0, covariance))
     estimator.end_rest(1500 * MS)
     t = 1500
     for step, a, b, c, d, is_fix in events:
         t += step
         if is_fix:
-            estimator.add_fix(Fix((t - 300) * MS, t * MS, a, b, c, cov))
+            estimator.add_fix(Fix((t - 300) * MS, t * MS, a, b, c, covariance))
         else:
             estimator.add_imu(ImuPacket(t * MS, max(step, 1) / 1000, a, b, c, d))
     assert np.isfinite(estimator.state()[1:13]).all()

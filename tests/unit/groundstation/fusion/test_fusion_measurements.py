@@ -20,9 +20,9 @@ def x(noise):
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.008])
-def test_the_jacobian_of_a_fix_is_the_derivative_of_its_innovation(noise, fix_cov, x, lag_s):
+def test_the_jacobian_of_a_fix_is_the_derivative_of_its_innovation(noise, fix_covariance, x, lag_s):
     lagging = replace(noise, gyro_lag_s=lag_s, acc_lag_s=2 * lag_s)
-    fix = Fix(0, 0, 0.3, 0.4, 0.8, fix_cov)
+    fix = Fix(0, 0, 0.3, 0.4, 0.8, fix_covariance)
     _, H = measurements.predict_fix(fix, x, 0.3, lagging)
     for k in range(es.SIZE):
         step = np.zeros(es.SIZE)
@@ -32,15 +32,15 @@ def test_the_jacobian_of_a_fix_is_the_derivative_of_its_innovation(noise, fix_co
         np.testing.assert_allclose(H[:, k], -(ahead - back) / 2e-6, atol=1e-3)
 
 
-def test_a_pose_taken_from_a_fix_predicts_that_fix(noise, fix_cov, x):
+def test_a_pose_taken_from_a_fix_predicts_that_fix(noise, fix_covariance, x):
     P = np.diag(es.initial_variance(noise))
-    fix = Fix(0, 0, -0.2, 0.7, 2.9, fix_cov)
+    fix = Fix(0, 0, -0.2, 0.7, 2.9, fix_covariance)
     measurements.take_pose(fix, x, P, 2 * np.pi, 0.1)
     z, H = measurements.predict_fix(fix, x, 0.0, noise)
     np.testing.assert_allclose(z, 0.0, atol=1e-12)
     assert abs(x[es.THETA] - 2 * np.pi) <= np.pi
     # what the fix knows of the body's origin is what the state now knows of it
-    np.testing.assert_allclose(H @ P @ H.T, fix_cov, atol=1e-15)
+    np.testing.assert_allclose(H @ P @ H.T, fix_covariance, atol=1e-15)
 
 
 def test_a_rest_on_a_slope_gives_bias_less_slope_and_leaves_their_split_open(noise, x):

@@ -48,7 +48,12 @@ def test_advice_names_leg_amount_and_uncertainty():
 def test_the_sigma_of_a_leg_is_that_of_the_slope_times_its_distance():
     sigma = 1e-4 * G_M_S2
     legs = levelling((0.02, 0.0), np.diag([sigma**2, 0.0]), LEGS).legs
-    assert {leg.name: round(1e3 * leg.std_m, 6) for leg in legs} == {"A": 0.0, "B": 0.36, "C": 0.36, "D": 0.0}
+    assert {leg.name: round(1e3 * leg.sigma_m, 6) for leg in legs} == {
+        "A": 0.0,
+        "B": 0.36,
+        "C": 0.36,
+        "D": 0.0,
+    }
 
 
 @pytest.mark.parametrize(

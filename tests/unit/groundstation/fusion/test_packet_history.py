@@ -18,7 +18,7 @@ def test_two_stretches_hold_what_the_whole_holds(a, b, c):
     a, b, c = sorted((a, b, c))
     history = filled()
     whole, first, second = history.between(a, c), history.between(a, b), history.between(b, c)
-    turned = [float((s.omega_rad_s * s.span_s).sum()) for s in (whole, first, second)]
+    turned = [float((s.rate_rad_s * s.span_s).sum()) for s in (whole, first, second)]
     assert turned[1] + turned[2] == pytest.approx(turned[0], abs=2e-7)  # slivers below 1 ns are left out
     assert whole.span_s.sum() == pytest.approx(c - a, abs=3e-9)
 
@@ -48,6 +48,6 @@ def test_an_empty_history_gives_an_empty_stretch():
 
 
 def test_the_gyro_is_read_in_the_packet_that_covers_the_moment():
-    assert filled().omega_at(0.255) == 25.0
-    assert filled().omega_at(9.0) == 49.0
-    assert np.isfinite(filled().omega_at(-1.0))
+    assert filled().rate_at(0.255) == 25.0
+    assert filled().rate_at(9.0) == 49.0
+    assert np.isfinite(filled().rate_at(-1.0))

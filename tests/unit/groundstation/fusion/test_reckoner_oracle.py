@@ -68,7 +68,7 @@ def loaded(reckoner, seed):
 def assert_same(first, second):
     assert bits(first.history.rows) == bits(second.history.rows)
     assert (first.origin_ns, first.newest_ns) == (second.origin_ns, second.newest_ns)
-    assert bits([first.newest_s, first.omega_rad_s]) == bits([second.newest_s, second.omega_rad_s])
+    assert bits([first.newest_s, first.rate_rad_s]) == bits([second.newest_s, second.rate_rad_s])
     assert first._counters.by_name == second._counters.by_name
     if first.has_pose:
         a, b = first.report(), second.report()
@@ -86,9 +86,9 @@ def test_both_say_the_same_whatever_comes(table_map, before, after, rests):
         if part and number:
             for reckoner in pair:
                 loaded(reckoner, len(before))
-        for ticks, jitter_ns, omega, ax, ay, temperature_c in packets_of_it:
+        for ticks, jitter_ns, rate, ax, ay, temperature_c in packets_of_it:
             t_ns, number = t_ns + ticks * PERIOD_NS, number + 1
-            packet = ImuPacket(t_ns + jitter_ns, max(ticks, 1) * 0.01, omega, ax, ay, temperature_c)
+            packet = ImuPacket(t_ns + jitter_ns, max(ticks, 1) * 0.01, rate, ax, ay, temperature_c)
             if rests and number == 40:
                 for reckoner in pair:
                     reckoner.rest(reckoner.newest_s, reckoner.newest_s + 0.1)
@@ -120,7 +120,7 @@ def test_records_are_laid_out_as_the_core_declares_them():
 
 def test_the_filter_on_oracles_estimates_the_same(monkeypatch):
     rng = np.random.default_rng(2)
-    cov = np.diag([1e-6, 1e-6, 1e-6])
+    covariance = np.diag([1e-6, 1e-6, 1e-6])
     reports = []
     filters = [ErrorStateFilter(NOISE)]
     monkeypatch.setattr(error_state_filter, "Reckoner", OracleReckoner)
@@ -133,7 +133,7 @@ def test_the_filter_on_oracles_estimates_the_same(monkeypatch):
         if number % 65 == 0:
             place = rng.normal(0.0, 1e-3, 3)
             for f in filters:
-                f.add_fix(Fix((number - 60) * PERIOD_NS, number * PERIOD_NS, *place, cov))
+                f.add_fix(Fix((number - 60) * PERIOD_NS, number * PERIOD_NS, *place, covariance))
         reports.append(said)
     assert filters[0].counters.by_name == filters[1].counters.by_name
     assert reports[-1][0] is not None

@@ -60,10 +60,10 @@ def test_late_fixes_of_a_slower_source_give_what_their_exposures_order_gives(noi
     assert used.count("stars") >= len(stars) - 2  # the first came before there was anything to go back to
     assert used.count("overhead") == len(above)
     a, b = late.state(), ordered.state()
-    assert abs(a.x_m - b.x_m) < 0.3 * b.std_x_m
-    assert abs(a.heading_rad - b.heading_rad) < 0.3 * b.std_heading_rad
-    assert abs(a.x_m - SPEED_M_S * 8.0) < 4 * a.std_x_m
-    assert a.std_x_m == pytest.approx(b.std_x_m, rel=0.05)
+    assert abs(a.x_m - b.x_m) < 0.3 * b.sigma_x_m
+    assert abs(a.heading_rad - b.heading_rad) < 0.3 * b.sigma_heading_rad
+    assert abs(a.x_m - SPEED_M_S * 8.0) < 4 * a.sigma_x_m
+    assert a.sigma_x_m == pytest.approx(b.sigma_x_m, rel=0.05)
 
 
 def test_two_sources_know_more_than_one(noise):
@@ -72,7 +72,7 @@ def test_two_sources_know_more_than_one(noise):
     soon = [(f.t_exposure_ns // MS + 20, f) for f in above]
     fly(alone, soon)
     fly(both, soon + [(f.t_exposure_ns // MS + 620, f) for f in stars])
-    assert both.state().std_x_m < alone.state().std_x_m
+    assert both.state().sigma_x_m < alone.state().sigma_x_m
 
 
 def test_a_late_fix_that_lies_leaves_the_estimate_as_it_was(noise):

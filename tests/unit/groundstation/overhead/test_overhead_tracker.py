@@ -9,9 +9,9 @@ import pytest
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import ALBEDO, Body, Light, TableView
 from groundstation.overhead.arcs import circles_of_rim
+from groundstation.overhead.circle_tracker import NoOverheadFix, OverheadFix, OverheadTracker
 from groundstation.overhead.liveries import Circle, Livery, load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
-from groundstation.overhead.tracker import NoOverheadFix, OverheadFix, OverheadTracker
 
 FILES = Path(__file__).parents[4] / "calibration" / "rigs" / "emulated"
 TABLE_M = (-2.0, 2.0, -1.5, 1.5)
@@ -64,7 +64,7 @@ def test_two_moving_mock_ups_are_found_at_once_with_a_true_covariance(view, trac
         for answer, pose in zip(tracker.look(image), poses, strict=True):
             assert isinstance(answer, OverheadFix)
             off.append(errors(answer, pose))
-            ratios.append(off[-1] @ np.linalg.solve(answer.cov, off[-1]) / 3)
+            ratios.append(off[-1] @ np.linalg.solve(answer.covariance, off[-1]) / 3)
     assert 0.5 < np.mean(ratios) < 2.0
     rms = np.sqrt(np.mean(np.square(off), axis=0))
     worse = 1.0 if jpeg_quality is None else 2.5
@@ -95,7 +95,7 @@ def test_a_circle_half_under_something_grey_is_found_by_its_rim(view, tracker):
     answer = tracker.look(image)[1]
     assert isinstance(answer, OverheadFix)
     assert (whole.whole, answer.whole) == (3, 2)
-    assert np.hypot(*errors(answer, BETA)[:2]) < 4.0 * np.sqrt(np.trace(answer.cov[:2, :2]))
+    assert np.hypot(*errors(answer, BETA)[:2]) < 4.0 * np.sqrt(np.trace(answer.covariance[:2, :2]))
 
 
 @pytest.mark.parametrize("colour", [(1.25, 1.0, 0.6), (0.8, 1.0, 1.25)])

@@ -15,7 +15,7 @@ from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.table import installed_tables
-from groundstation.recording.channels import channel_name, parse_channel
+from groundstation.recording.channel_names import channel_name, parse_channel
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy

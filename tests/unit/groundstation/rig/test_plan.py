@@ -6,7 +6,6 @@ import pytest
 
 from groundstation.declarations.errors import RigError
 from groundstation.rig.plan import (
-    config_crc,
     gives_way,
     laboratory_ports,
     make_node,
@@ -101,18 +100,6 @@ def test_commands_come_first_and_every_port_has_a_process():
     assert processes[1:] == sorted(processes[1:])
     assert {home for _, home in ports_of(rig)} <= set(processes)
     assert not gives_way(rig, "commands")
-
-
-def test_the_crc_of_the_configuration_covers_keys_and_contents_of_files(tmp_path):
-    constants = '[gyro_scale]\nvalue = {}\nstd = 0.0001\nunit = "1"\n'
-    text = DRAWN.read_text().replace("baud = 250000", 'baud = 250000\ncalibration = ["joint.toml"]')
-    path, file = tmp_path / "rig.toml", tmp_path / "joint.toml"
-    file.write_text(constants.format(0.004))
-    first = config_crc(parse_rig(text, path))
-    assert config_crc(parse_rig(text, path)) == first
-    assert config_crc(parse_rig(text.replace("x_m = 0.2", "x_m = 0.3"), path)) != first
-    file.write_text(constants.format(0.005))
-    assert config_crc(parse_rig(text, path)) != first
 
 
 def test_addresses_of_a_laboratory_become_what_it_announced():

@@ -67,7 +67,6 @@ def slot_of(node, *, measure=False, timing=None):
         "alpha/follower",
         node,
         "alpha_flight",
-        77,
         JournalWriter(),
         Sequences(),
         measure=measure,
@@ -145,7 +144,7 @@ def test_the_journal_names_what_the_node_consumed_and_published():
     slot.stop(8)
     key = "alpha/follower"
     assert journaled(slot) == [
-        Entry(3, Kind.START, key, "", "alpha_flight", 77, 0),
+        Entry(3, Kind.START, key, "", "alpha_flight", 0, 0),
         Entry(3, Kind.OUTPUT, key, "diagnostics", "alpha_flight", 1, 0),
         Entry(4, Kind.INPUT, key, STATE, "bravo", 9, 0),
         Entry(5, Kind.INPUT, key, DEMAND, "alpha", 2, 0),
@@ -182,7 +181,7 @@ def test_a_message_that_is_not_among_a_nodes_outputs_is_refused_by_name():
 
 def test_slots_of_one_process_share_its_numbers():
     journal, sequences = JournalWriter(), Sequences(after=41)
-    slots = [Slot(f"alpha/{n}", Follower(), "p", 0, journal, sequences, measure=False) for n in ("a", "b")]
+    slots = [Slot(f"alpha/{n}", Follower(), "p", journal, sequences, measure=False) for n in ("a", "b")]
     assert [slot.tick(5)[0].envelope.sequence for slot in (*slots, *slots)] == [42, 43, 44, 45]
     assert sequences.next(Wrench.TOPIC, "alpha") == 46
     assert sequences.next(Wrench.TOPIC, "bravo") == 42

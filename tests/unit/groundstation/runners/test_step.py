@@ -95,7 +95,6 @@ class Bench:
                 f"{node.vehicle}/taker_{place}",
                 node,
                 PROCESS,
-                5,
                 self.journal,
                 sequences,
                 False,

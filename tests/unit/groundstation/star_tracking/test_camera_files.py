@@ -86,14 +86,14 @@ def test_a_catalogue_keeps_ids_and_positions(tmp_path):
     catalogue = StarCatalogue.load(path)
     assert catalogue.ids == ("0", "1", "2", "3")
     assert catalogue.y_m[3] == 2.5
-    assert not catalogue.std_m.any()
+    assert not catalogue.sigma_m.any()
 
 
 def test_a_surveyed_catalogue_brings_its_standard_deviations(tmp_path):
     path = tmp_path / "ceiling.csv"
     lines = ROWS.splitlines()
     path.write_text("\n".join([lines[0] + ",std_x_m,std_y_m", *(line + ",3e-4,4e-4" for line in lines[1:])]))
-    assert np.allclose(StarCatalogue.load(path).std_m, np.sqrt(12.5) * 1e-4)
+    assert np.allclose(StarCatalogue.load(path).sigma_m, np.sqrt(12.5) * 1e-4)
 
 
 @pytest.mark.parametrize(

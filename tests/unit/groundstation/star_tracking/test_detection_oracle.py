@@ -35,7 +35,7 @@ def assert_equal_spots(both, image):
     twin = far.argmin(axis=0)
     assert len(set(twin)) == len(pure)
     assert far.min(axis=0).max() < ROUNDING_PX
-    for name in ("flux_dn", "cov_px2", "elongation", "streak_px"):
+    for name in ("flux_dn", "covariance_px2", "elongation", "streak_px"):
         one, two = getattr(compiled, name)[twin], getattr(pure, name)
         if name == "streak_px":  # whose sign is unknown
             two = two * np.where((one * two).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
@@ -146,9 +146,11 @@ def test_rows_that_lie_apart_and_columns_turned_round(both, painter):
 
 def test_spots_are_kept_when_the_next_picture_comes(both, painter):
     first = both[0].find(painter.paint(np.random.default_rng(4), (2.5, 2.0, 1.0)))
-    before = [getattr(first, name).copy() for name in ("u_px", "v_px", "flux_dn", "cov_px2", "streak_px")]
+    before = [
+        getattr(first, name).copy() for name in ("u_px", "v_px", "flux_dn", "covariance_px2", "streak_px")
+    ]
     both[0].find(painter.paint(np.random.default_rng(5), (2.0, 1.5, -1.0)))
-    after = [first.u_px, first.v_px, first.flux_dn, first.cov_px2, first.streak_px]
+    after = [first.u_px, first.v_px, first.flux_dn, first.covariance_px2, first.streak_px]
     assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
 
 
@@ -206,5 +208,5 @@ def test_wider_vectors_give_the_same_bits(painter, tmp_path, monkeypatch):
         image = painter.paint(np.random.default_rng(9), (2.5, 2.0, 0.4), velocity, exposure_s=0.04)
         one, two = wide.find(image), narrow.find(image)
         assert len(one) > 10
-        for name in ("u_px", "v_px", "flux_dn", "cov_px2", "elongation", "streak_px"):
+        for name in ("u_px", "v_px", "flux_dn", "covariance_px2", "elongation", "streak_px"):
             assert np.array_equal(getattr(one, name), getattr(two, name)), name

@@ -7,12 +7,12 @@ import pytest
 from oracles.motion import Smear, smear_from_streaks, unbend
 
 from groundstation.star_tracking.detection import detect
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, Refusal, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, Refusal
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 
 def error_mm(fix, pose):
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     return 1e3 * np.hypot(fix.x_m - pose[0], fix.y_m - pose[1])
 
 
@@ -33,8 +33,8 @@ def test_the_rolling_shutter_term_takes_out_what_the_rows_saw_later(painter, cat
     without, with_term = [], []
     for _ in range(6):
         pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.7), rng.uniform(-3, 3))
-        direction, omega = rng.uniform(-np.pi, np.pi), rng.uniform(-1.0, 1.0)
-        velocity = (0.5 * np.cos(direction), 0.5 * np.sin(direction), omega)
+        direction, rate = rng.uniform(-np.pi, np.pi), rng.uniform(-1.0, 1.0)
+        velocity = (0.5 * np.cos(direction), 0.5 * np.sin(direction), rate)
         spots = detect(painter.paint(rng, pose, velocity, exposure_s=0.005, readout_s=0.025))
         without.append(error_mm(plain.solve(spots), pose))
         with_term.append(error_mm(aware.solve(spots, motion=BodyMotion(*velocity)), pose))

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.prior_governor import GovernorSettings, PriorGovernor
 
 NONE = np.zeros(0, np.int64)
 
 
 def fix(mode, x=1.0):
-    return StarFix(x, 2.0, 0.5, np.eye(3) * 1e-8, 9, mode, NONE, NONE, np.zeros((0, 2)), 50.0)
+    return PictureFix(x, 2.0, 0.5, np.eye(3) * 1e-8, 9, mode, NONE, NONE, np.zeros((0, 2)), 50.0)
 
 
-def prior(std=0.005, x=1.0):
-    return PosePrior(x, 2.0, 0.5, np.eye(3) * std**2)
+def prior(sigma=0.005, x=1.0):
+    return PosePrior(x, 2.0, 0.5, np.eye(3) * sigma**2)
 
 
 REFUSED = NoFix(Refusal.NO_CONSENSUS, "none", 5)
@@ -47,6 +47,6 @@ def test_a_refusal_or_a_contradicted_prior_forces_a_search_from_nothing():
 def test_a_vague_or_undefined_prior_is_not_used():
     governor = PriorGovernor()
     governor.note(fix(Mode.LOST_IN_SPACE))
-    assert governor.admit(prior(std=0.1)) is None
+    assert governor.admit(prior(sigma=0.1)) is None
     assert governor.admit(PosePrior(1.0, 2.0, 0.5, np.full((3, 3), np.nan))) is None
     assert governor.admit(None) is None

@@ -79,7 +79,7 @@ def reason_of(said):
     assert fix.fix == (fix.reason == "")
     (image,) = said[StarImage]
     assert fix.stamp_ns == image.stamp_ns - DELAY_NS  # the middle of the exposure, not the arrival
-    assert fix.stamp_sigma_s == DELAY.delay_std_s
+    assert fix.stamp_sigma_s == DELAY.delay_sigma_s
     return fix.reason.partition(":")[0]
 
 

@@ -5,7 +5,7 @@ import pytest
 from oracles.search import oracle_tracker
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
 
@@ -21,9 +21,9 @@ def spots_of(painter, rng, stars_m, pose):
     inside = (uv > 4.0).all(axis=1) & (uv < (635.0, 475.0)).all(axis=1)
     uv = uv[inside] + rng.normal(0.0, 0.03, (int(inside.sum()), 2))
     n = len(uv)
-    cov = np.tile([0.03**2, 0.0, 0.03**2], (n, 1))
+    covariance = np.tile([0.03**2, 0.0, 0.03**2], (n, 1))
     light = np.linspace(900, 300, n)
-    return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+    return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
 
 
 @pytest.mark.parametrize("make", [StarTracker, oracle_tracker])
@@ -39,8 +39,8 @@ def test_rows_and_columns_of_leds_are_refused_in_words(painter, camera, make):
         assert "More than one place" in answer.detail
         assert answer.guess is not None
         # What is believed beforehand may decide between the places.
-        fix = tracker.solve(spots, PosePrior(*pose, cov=np.diag([1e-4] * 3)))
-        assert isinstance(fix, StarFix)
+        fix = tracker.solve(spots, PosePrior(*pose, covariance=np.diag([1e-4] * 3)))
+        assert isinstance(fix, PictureFix)
 
 
 @pytest.mark.parametrize("make", [StarTracker, oracle_tracker])
@@ -50,5 +50,5 @@ def test_leds_a_few_millimetres_out_of_line_tell_the_places_apart(painter, camer
     for _ in range(10):
         pose = (rng.uniform(1.5, 3.5), rng.uniform(1.3, 2.5), rng.uniform(-np.pi, np.pi))
         fix = tracker.solve(spots_of(painter, rng, stars, pose))
-        assert isinstance(fix, StarFix)
+        assert isinstance(fix, PictureFix)
         assert np.hypot(fix.x_m - pose[0], fix.y_m - pose[1]) < 1e-3

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles.search import oracle_tracker
 
 from groundstation.star_tracking.detection import Spots, detect
-from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PosePrior, StarFix
+from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PictureFix, PosePrior
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
@@ -26,10 +26,14 @@ def twins(catalogue, camera):
 def spots_at(uv, rng, sigma_px=0.03):
     """Spots without a picture, their covariances and streaks at random."""
     n = len(uv)
-    cov = np.column_stack((rng.uniform(0.5, 2.0, n), rng.uniform(-0.3, 0.3, n), rng.uniform(0.5, 2.0, n)))
+    covariance = np.column_stack(
+        (rng.uniform(0.5, 2.0, n), rng.uniform(-0.3, 0.3, n), rng.uniform(0.5, 2.0, n))
+    )
     streak = rng.uniform(-2.0, 2.0, (n, 2))
     light = np.linspace(900, 300, n)
-    return Spots(uv[:, 0].copy(), uv[:, 1].copy(), light, sigma_px**2 * cov, np.ones(n), streak, 10.0, 1.0)
+    return Spots(
+        uv[:, 0].copy(), uv[:, 1].copy(), light, sigma_px**2 * covariance, np.ones(n), streak, 10.0, 1.0
+    )
 
 
 def mixed_sky(painter, rng, stars, lights, sigma_px):
@@ -53,8 +57,8 @@ def assert_equal(one, two):
     assert (one.mode, one.stars) == (two.mode, two.stars)
     off = (one.x_m - two.x_m, one.y_m - two.y_m, np.angle(np.exp(1j * (one.heading_rad - two.heading_rad))))
     assert np.abs(off).max() < 1e-9
-    std = np.sqrt(np.diag(two.cov))
-    assert np.abs((one.cov - two.cov) / np.outer(std, std)).max() < 1e-6
+    sigma = np.sqrt(np.diag(two.covariance))
+    assert np.abs((one.covariance - two.covariance) / np.outer(sigma, sigma)).max() < 1e-6
     assert np.abs(one.residual_m - two.residual_m).max() < 1e-9
     assert one.evidence_nats == pytest.approx(two.evidence_nats, abs=1e-6)
 
@@ -77,10 +81,10 @@ def test_stars_among_strange_lights(painter, twins, seed, stars, lights, sigma_p
 def test_from_a_prior_right_or_wrong(painter, twins, seed, stars, off):
     rng = np.random.default_rng(seed)
     spots, pose = mixed_sky(painter, rng, stars, int(rng.integers(0, 5)), 0.05)
-    std = np.array([0.01, 0.008, 0.01])
-    mean = np.asarray(pose) + off * std * rng.normal(size=3)
+    sigma = np.array([0.01, 0.008, 0.01])
+    mean = np.asarray(pose) + off * sigma * rng.normal(size=3)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    prior = PosePrior(*mean, cov=turn @ np.diag(std**2) @ turn.T)
+    prior = PosePrior(*mean, covariance=turn @ np.diag(sigma**2) @ turn.T)
     one, two = (twin.solve(spots, prior) for twin in twins)
     assert_equal(one, two)
 
@@ -88,8 +92,8 @@ def test_from_a_prior_right_or_wrong(painter, twins, seed, stars, off):
 @pytest.mark.parametrize("variance", [np.nan, -1e-3])
 def test_a_prior_that_is_none_ends_in_lost_in_space(painter, twins, variance):
     spots, pose = mixed_sky(painter, np.random.default_rng(11), 20, 0, 0.03)
-    fix = twins[0].solve(spots, PosePrior(*pose, cov=variance * np.eye(3)))
-    assert isinstance(fix, StarFix)
+    fix = twins[0].solve(spots, PosePrior(*pose, covariance=variance * np.eye(3)))
+    assert isinstance(fix, PictureFix)
     assert fix.mode is Mode.LOST_IN_SPACE
 
 
@@ -102,7 +106,7 @@ def test_with_a_known_motion(painter, catalogue, camera, exposure_s, readout_s):
     velocity = (0.3, -0.2, 0.5)
     spots = detect(painter.paint(rng, (2.4, 1.8, 0.7), velocity, exposure_s, readout_s))
     one, two = (twin.solve(spots, motion=BodyMotion(*velocity)) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -115,7 +119,7 @@ def test_painted_pictures_sharp_and_blurred(painter, twins, velocity, lights):
     strangers = [(*rng.uniform((10.0, 10.0), (630.0, 470.0)), 30e3) for _ in range(lights)]
     spots = detect(painter.paint(rng, (2.7, 2.2, -1.1), velocity, 0.033, lights=strangers))
     one, two = (twin.solve(spots) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -138,7 +142,7 @@ def test_spots_in_one_place_and_far_outside_do_no_harm(painter, twins):
     uv = np.column_stack((spots.u_px, spots.v_px))
     odd = [uv[0], uv[0], uv[1], [-1e9, 1e9], [3e5, -5.0]]
     one, two = (twin.solve(spots_at(np.concatenate((uv, odd)), np.random.default_rng(1))) for twin in twins)
-    assert isinstance(one, StarFix)
+    assert isinstance(one, PictureFix)
     assert_equal(one, two)
 
 
@@ -146,7 +150,7 @@ def test_nan_among_the_spots_gives_a_fix_without_them_or_none(painter, twins):
     spots, _ = mixed_sky(painter, np.random.default_rng(16), 12, 0, 0.03)
     spots.u_px[3] = np.nan
     fix = twins[0].solve(spots)
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     assert 3 not in fix.spot_index
     spots.u_px[:] = np.nan
     assert isinstance(twins[0].solve(spots), NoFix)
@@ -190,5 +194,5 @@ def test_caps_of_work_are_the_same(painter, catalogue, camera):
 
 def test_tracking_says_so(painter, twins):
     spots, pose = mixed_sky(painter, np.random.default_rng(20), 10, 0, 0.03)
-    fix = twins[0].solve(spots, PosePrior(*pose, cov=np.diag([1e-4] * 3)))
+    fix = twins[0].solve(spots, PosePrior(*pose, covariance=np.diag([1e-4] * 3)))
     assert fix.mode is Mode.TRACKING

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import StarFix
+from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.sky_change import Change
 from groundstation.star_tracking.sky_watch import SkyWatch
 from groundstation.star_tracking.tracker import StarTracker
@@ -25,8 +25,10 @@ class Flight:
         inside &= (uv > 5).all(axis=1) & (uv[:, 0] < 634) & (uv[:, 1] < 474)
         uv = uv[inside] + self.rng.normal(0.0, 0.05, (int(inside.sum()), 2))
         n = len(uv)
-        cov = np.tile([0.0025, 0.0, 0.0025], (n, 1))
-        return Spots(uv[:, 0], uv[:, 1], np.linspace(9, 3, n), cov, np.ones(n), np.zeros((n, 2)), 10.0, 1.0)
+        covariance = np.tile([0.0025, 0.0, 0.0025], (n, 1))
+        return Spots(
+            uv[:, 0], uv[:, 1], np.linspace(9, 3, n), covariance, np.ones(n), np.zeros((n, 2)), 10.0, 1.0
+        )
 
     def fly(self, count, stars=None, lit=None):
         """Changes found, and the fixes behind them."""
@@ -36,7 +38,7 @@ class Flight:
         for _ in range(count):
             spots = self.picture(stars, lit)
             fix = self.tracker.solve(spots)
-            assert isinstance(fix, StarFix)
+            assert isinstance(fix, PictureFix)
             found = self.watch.note(fix, spots)
             if found:
                 self.tracker.drop(self.watch.dropped)
@@ -129,7 +131,7 @@ def test_the_covariance_of_a_new_light_is_true(painter, catalogue, camera, free_
         flight = Flight(painter, catalogue, camera, seed)
         changes, _ = flight.fly(45, stars=np.vstack((painter.stars_m, free_place)))
         error = place_of(changes[0]) - free_place
-        xx, xy, yy = changes[0].cov_m2
+        xx, xy, yy = changes[0].covariance_m2
         squares.append(error @ np.linalg.solve([[xx, xy], [xy, yy]], error) / 2)
     assert 0.2 < np.mean(squares) < 2.2  # mean of 8 chi-squares of two, halved: 1 sigma is 0.35
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from groundstation.star_tracking.detection import PictureError, Spots, detect
-from groundstation.star_tracking.fixes import Mode, NoFix, PosePrior, Refusal, StarFix
+from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, PosePrior, Refusal
 from groundstation.star_tracking.tracker import StarTracker
 
 
@@ -17,12 +17,12 @@ def tracker(catalogue, camera):
 def spots_at(uv, sigma_px=0.03):
     """Spots without a picture: centres with a known error."""
     n = len(uv)
-    cov = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
+    covariance = np.tile([sigma_px**2, 0.0, sigma_px**2], (n, 1))
     return Spots(
         uv[:, 0].copy(),
         uv[:, 1].copy(),
         np.linspace(900, 300, n),
-        cov,
+        covariance,
         np.ones(n),
         np.zeros((n, 2)),
         10.0,
@@ -44,7 +44,7 @@ def test_a_painted_sky_is_solved_to_a_tenth_of_a_millimetre(painter, tracker):
     for _ in range(4):
         pose = random_pose(rng)
         fix = tracker.solve(detect(painter.paint(rng, pose)))
-        assert isinstance(fix, StarFix)
+        assert isinstance(fix, PictureFix)
         assert fix.mode is Mode.LOST_IN_SPACE
         error = pose_error(fix, pose)
         assert np.hypot(*error[:2]) < 1e-4
@@ -69,7 +69,7 @@ def test_a_few_stars_scattered_over_the_picture_are_enough(painter, tracker, lef
         seen = rng.permutation(painter.visible(pose))[:left]
         uv = painter.project(*pose)[seen] + rng.normal(0.0, 0.03, (left, 2))
         fix = tracker.solve(spots_at(uv))
-        assert isinstance(fix, StarFix)
+        assert isinstance(fix, PictureFix)
         assert np.hypot(*pose_error(fix, pose)[:2]) < 2e-3
 
 
@@ -83,7 +83,7 @@ def test_three_stars_are_believed_only_with_a_prior(painter, tracker):
     assert alone.reason is Refusal.TOO_FEW_STARS
     prior = PosePrior(pose[0] + 0.01, pose[1] - 0.008, pose[2] + 0.005, np.diag([1e-4, 1e-4, 1e-4]))
     fix = tracker.solve(spots, prior)
-    assert isinstance(fix, StarFix)
+    assert isinstance(fix, PictureFix)
     assert fix.mode is Mode.TRACKING
     assert np.hypot(*pose_error(fix, pose)[:2]) < 1e-3
 
@@ -117,7 +117,7 @@ def test_the_reported_covariance_is_the_error_s(painter, tracker):
         uv = painter.project(*pose)[seen] + rng.normal(0.0, 0.05, (len(seen), 2))
         fix = tracker.solve(spots_at(uv, sigma_px=0.05))
         error = pose_error(fix, pose)
-        ratios.append(error @ np.linalg.solve(fix.cov, error) / 3.0)
+        ratios.append(error @ np.linalg.solve(fix.covariance, error) / 3.0)
     assert 0.8 < np.mean(ratios) < 1.25
 
 
@@ -168,4 +168,4 @@ def test_the_same_picture_gives_the_same_fix_bit_for_bit(painter, tracker):
     image = painter.paint(rng, (2.2, 1.9, -2.0))
     one, two = tracker.solve(detect(image)), tracker.solve(detect(image))
     assert (one.x_m, one.y_m, one.heading_rad) == (two.x_m, two.y_m, two.heading_rad)
-    assert np.array_equal(one.cov, two.cov)
+    assert np.array_equal(one.covariance, two.covariance)

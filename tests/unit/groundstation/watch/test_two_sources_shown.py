@@ -10,8 +10,8 @@ from groundstation.watch.monitor import Monitor
 
 
 def pair(verdict, reason="", difference=(0.001, 0.0, 0.0), nis=3.0):
-    std = (0.001, 0.001, 0.001)
-    return FixComparison(7, "alpha", 0.01, difference, std, nis, 9, difference, nis, verdict, reason)
+    sigma = (0.001, 0.001, 0.001)
+    return FixComparison(7, "alpha", 0.01, difference, sigma, nis, 9, difference, nis, verdict, reason)
 
 
 def test_an_event_says_when_sources_begin_to_disagree_and_when_they_agree_again(tables, delivered):

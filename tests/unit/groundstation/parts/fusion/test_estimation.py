@@ -28,9 +28,9 @@ def rig_of(folder, table="", imu="", more=""):
     return parse_rig(text + more, folder / "rig.toml")
 
 
-def write_map(path, std=1e-4):
+def write_map(path, sigma_m_s2=1e-4):
     y, x = np.meshgrid(np.linspace(-1.5, 1.5, 7), np.linspace(-2.0, 2.0, 9), indexing="ij")
-    sigma, nothing = np.full(x.shape, std), np.zeros_like(x)
+    sigma, nothing = np.full(x.shape, sigma_m_s2), np.zeros_like(x)
     TableMap(
         -2.0, -1.5, 0.5, 1e-3 * x, -2e-3 * y, sigma, sigma, nothing, (0.0, 0.0), 1e-9 * np.eye(2), 1e-3,
         MapProvenance(NOON, {"laps.mcap": "0" * 64}, 1.0, 300.0),

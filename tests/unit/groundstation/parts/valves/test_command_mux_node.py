@@ -12,7 +12,7 @@ from groundstation.control.mux import MuxConfig
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.valves.command_mux import CommandMux
+from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.messages import ValveDemand
 
 MS = 1_000_000
@@ -25,7 +25,7 @@ def modulator():
 
 @pytest.fixture
 def mux():
-    return CommandMux(
+    return CommandMuxNode(
         "alpha",
         MuxConfig(),
         BrakeConfig(),

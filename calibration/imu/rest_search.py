@@ -28,7 +28,7 @@ def find_rests(
 
     Args:
         t_s: (n,) stamps, ascending.
-        readings: (n, 3) omega rad/s, ax, ay m/s^2.
+        readings: (n, 3) rate rad/s, ax, ay m/s^2.
         least_s: shorter ones are left out.
         loudest: (3,) sigma of one packet beyond which the sensors' own noise cannot be; None if unknown.
 

@@ -4,14 +4,12 @@ from collections.abc import Iterator
 
 from groundstation.control.brake import BrakeConfig, brake_wrench
 from groundstation.control.edge import EdgeVerdict, edge_outlook
-from groundstation.control.envelope import WrenchEnvelope
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.modulation import PulseModulator
-from groundstation.control.mux import CommandMux as Choice
-from groundstation.control.mux import MuxConfig, Selection, Source
-from groundstation.control.state import ControlState
-from groundstation.control.state import Wrench as BodyWrench
+from groundstation.control.mux import CommandMux, MuxConfig, Selection, Source
+from groundstation.control.state import BodyWrench, ControlState
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -26,7 +24,7 @@ SLOPE_M_S2 = 0.005  # a table half a milliradian off level
 REACTION_S = 0.15  # age of the state, a modulation period, the opening of a valve
 
 
-class CommandMux(Node):
+class CommandMuxNode(Node):
     """Publishes every 20 ms, and at once on a new demand, what the valves are to do and who wants it.
 
     Args:
@@ -54,7 +52,7 @@ class CommandMux(Node):
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._keep_in = keep_in
-        self._choice: Choice[bytes] = Choice(config)
+        self._choice: CommandMux[bytes] = CommandMux(config)
         self._brake = brake
         self._model = model
         self._envelope = WrenchEnvelope(model)

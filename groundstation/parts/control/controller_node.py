@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from groundstation.control.averaging import RateMean
-from groundstation.control.controller import Controller as ControlLaw
+from groundstation.control.controller import Controller
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.state import NO_WRENCH, ControlState, Goal
-from groundstation.control.state import Wrench as BodyWrench
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -23,7 +22,7 @@ STALE_NS = 300_000_000
 STATUS_EVERY = 2
 
 
-class Controller(Node):
+class ControllerNode(Node):
     """Runs the control law of the rig; says nothing while the state is stale or the vehicle is not flying.
 
     Args:
@@ -44,7 +43,7 @@ class Controller(Node):
     def __init__(
         self,
         vehicle: str,
-        law: ControlLaw,
+        law: Controller,
         name: str,
         goal: Goal,
         keep_in: KeepIn,

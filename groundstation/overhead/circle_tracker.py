@@ -43,7 +43,7 @@ class OverheadFix:
         x_m: Body origin.
         y_m: Body origin.
         heading_rad: In (-pi, pi].
-        cov: Covariance (3, 3) of x, y, heading; m^2, m rad, rad^2.
+        covariance: Covariance (3, 3) of x, y, heading; m^2, m rad, rad^2.
         misfit_m: RMS distance between circles and pattern.
         circles: How many were used.
         whole: How many of them were seen whole.
@@ -53,7 +53,7 @@ class OverheadFix:
     x_m: float
     y_m: float
     heading_rad: float
-    cov: Array
+    covariance: Array
     misfit_m: float
     circles: int
     whole: int
@@ -159,7 +159,7 @@ def _fit(
     place = np.array([circle.place_m for circle in circles])
     turn, shift = rigid_fit(body, place)
     x = np.array([shift.real, shift.imag, float(np.angle(turn))])
-    own = [np.linalg.inv(circle.cov_m2) for circle in circles]
+    own = [np.linalg.inv(circle.covariance_m2) for circle in circles]
     for _ in range(2):
         arm = body * np.exp(1j * x[2])
         residual = place - (complex(x[0], x[1]) + arm)
@@ -168,12 +168,12 @@ def _fit(
             lever = np.array([[1.0, 0.0, -a.imag], [0.0, 1.0, a.real]])
             information += lever.T @ weight @ lever
             gradient += lever.T @ weight @ (r.real, r.imag)
-        cov = np.linalg.inv(information)
-        x = x + cov @ gradient
+        covariance = np.linalg.inv(information)
+        x = x + covariance @ gradient
     residual = place - (complex(x[0], x[1]) + body * np.exp(1j * x[2]))
     glue = np.eye(2) * PATTERN_SIGMA_M**2
     chi2 = sum(
-        float((r.real, r.imag) @ np.linalg.inv(circle.cov_m2 + glue) @ (r.real, r.imag))
+        float((r.real, r.imag) @ np.linalg.inv(circle.covariance_m2 + glue) @ (r.real, r.imag))
         for r, circle in zip(residual, circles, strict=True)
     )
     fix = OverheadFix(
@@ -181,7 +181,7 @@ def _fit(
         float(x[0]),
         float(x[1]),
         float(np.angle(np.exp(1j * x[2]))),
-        np.asarray(cov),
+        np.asarray(covariance),
         float(np.sqrt((np.abs(residual) ** 2).mean())),
         len(circles),
         sum(circle.is_whole for circle in circles),

@@ -3,10 +3,9 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 
-from drivers.valve_bus.guard import Guard as Gate
+from drivers.valve_bus import messages as bus
+from drivers.valve_bus.guard import Guard
 from drivers.valve_bus.guard_account import Verdict
-from drivers.valve_bus.messages import Arm, StopReason
-from drivers.valve_bus.messages import ValveCommand as Command
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -18,12 +17,12 @@ PERIOD_NS = 20_000_000
 DIAGNOSTICS_EVERY = 50
 
 
-class Guard(Node):
+class GuardNode(Node):
     """Lets commands through while the vehicle is armed and the selection is fresh; closes otherwise.
 
     Args:
         vehicle: Its name.
-        gate: The gate before its valves.
+        guard: The gate before its valves.
         known: Names of all actions; it refuses what none of them is.
         absent: Those of them that no node answers here, and why; it refuses these, too.
     """
@@ -32,9 +31,9 @@ class Guard(Node):
     outputs = (ValveCommand, VehicleMode, Ack, Diagnostics)
     trigger = ValveSelection
 
-    def __init__(self, vehicle: str, gate: Gate, known: frozenset[str], absent: Mapping[str, str]) -> None:
+    def __init__(self, vehicle: str, guard: Guard, known: frozenset[str], absent: Mapping[str, str]) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self._gate = gate
+        self._guard = guard
         self._known = known
         self._absent = absent
         self._ticks = 0
@@ -45,10 +44,10 @@ class Guard(Node):
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
             case ValveSelection():
-                command = Command(
-                    self._gate.vehicle, message.counter, message.pulse_id, tuple(message.on_time_ms)
+                command = bus.ValveCommand(
+                    self._guard.vehicle, message.counter, message.pulse_id, tuple(message.on_time_ms)
                 )
-                if self._gate.update(now_ns, command) is Verdict.NEW_PULSE:
+                if self._guard.update(now_ns, command) is Verdict.NEW_PULSE:
                     yield self._output(now_ns)
             case Request() if self._answers(message.action):
                 reason = self._carry_out(message, now_ns)
@@ -61,13 +60,13 @@ class Guard(Node):
         yield self._output(now_ns)
         self._ticks += 1
         if self._ticks % DIAGNOSTICS_EVERY == 0:
-            counters = self._gate.counters
+            counters = self._guard.counters
             names = tuple(field.name for field in fields(counters))
             values = tuple(str(getattr(counters, name)) for name in names)
             yield Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/guard", 0, "", names, values)
 
     def stop(self, now_ns: int) -> Iterator[Message]:
-        self._gate.stop(now_ns, StopReason.SHUTDOWN)
+        self._guard.stop(now_ns, bus.StopReason.SHUTDOWN)
         yield self._output(now_ns)
 
     def _answers(self, action: str) -> bool:
@@ -85,24 +84,24 @@ class Guard(Node):
             return str(error)
         match request.action:
             case "arm":
-                if not self._gate.arm(now_ns):
+                if not self._guard.arm(now_ns):
                     return "a stop is latched: release it first"
             case "disarm":
-                self._gate.disarm(now_ns)
+                self._guard.disarm(now_ns)
             case "stop":
-                self._gate.stop(now_ns, StopReason.OPERATOR)
+                self._guard.stop(now_ns, bus.StopReason.OPERATOR)
             case "release":
-                self._gate.release_stop(now_ns)
+                self._guard.release_stop(now_ns)
         return ""
 
     def _mode(self, now_ns: int, author: str, reason: str) -> VehicleMode:
-        stopped = self._gate.stop_reason is not None
-        return VehicleMode(now_ns, self.vehicle, self._gate.is_armed, stopped, author, reason)
+        stopped = self._guard.stop_reason is not None
+        return VehicleMode(now_ns, self.vehicle, self._guard.is_armed, stopped, author, reason)
 
     def _output(self, now_ns: int) -> ValveCommand:
-        output = self._gate.tick(now_ns)
-        arming = next((said for said in output.messages if isinstance(said, Arm)), None)
-        stop = self._gate.stop_reason
+        output = self._guard.tick(now_ns)
+        arming = next((message for message in output.messages if isinstance(message, bus.Arm)), None)
+        stop = self._guard.stop_reason
         return ValveCommand(
             now_ns,
             self.vehicle,

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 from groundstation.control.modulation import PulseModulator
-from groundstation.control.state import Wrench as BodyWrench
+from groundstation.control.state import BodyWrench
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 
 
-class Allocation(Node):
+class AllocationNode(Node):
     """Turns each wrench of the controller into pulses; the controller's rate is the modulation's."""
 
     inputs = (Wrench, ValveCommand)

@@ -49,14 +49,14 @@ class OverheadPose:
 
     Attributes:
         camera: The lens that was given, with the pose found.
-        std: Standard deviations in the order of ``POSE``.
+        sigma: Standard deviations in the order of ``POSE``.
         residual_px: Corner minus model, (n, 2).
         tape_m: By how much each placement had to be moved (k, 2), m.
         tape_rad: And turned (k,).
     """
 
     camera: OverheadCamera
-    std: Array
+    sigma: Array
     residual_px: Array
     tape_m: Array
     tape_rad: Array
@@ -94,11 +94,15 @@ def calibrate_overhead_pose(
     found = least_squares(misfit, start, x_scale=np.concatenate((np.full(6, 0.01), priors)))
     residual_px = _corner_misfit(found.x, views, lens, board_height_m) * CORNER_SIGMA_PX
     jacobian = np.asarray(found.jac, dtype=np.float64)
-    cov = np.linalg.inv(jacobian.T @ jacobian)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
     excess = max(1.0, float((residual_px**2).mean()) / CORNER_SIGMA_PX**2)
     tape = found.x[6:].reshape(-1, 3)
     return OverheadPose(
-        _camera(lens, found.x), np.sqrt(np.diag(cov)[:6] * excess), residual_px, tape[:, :2], tape[:, 2]
+        _camera(lens, found.x),
+        np.sqrt(np.diag(covariance)[:6] * excess),
+        residual_px,
+        tape[:, :2],
+        tape[:, 2],
     )
 
 

@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.control.state import Wrench, bounded, clamp
+from groundstation.control.state import BodyWrench, bounded, clamp
 from groundstation.control.vehicle import VehicleModel
 
 _PARALLEL = 1e-9  # of unit normals: two columns closer than this span no facet
@@ -33,7 +33,7 @@ class WrenchEnvelope:
         self.max_force_n = _first_hit(np.hypot(self._normals[:, 0], self._normals[:, 1]), self._reach)
         """Force that can be made in every direction with no torque."""
 
-    def saturate(self, wrench: Wrench) -> Wrench:
+    def saturate(self, wrench: BodyWrench) -> BodyWrench:
         """The wrench, shortened where the valves cannot make it; torque is served first.
 
         Heading goes first because a mock-up that loses its heading pushes in wrong directions; force then
@@ -47,9 +47,9 @@ class WrenchEnvelope:
         torque = clamp(torque, self.max_torque_nm)
         left = self._reach - self._normals[:, 2] * torque
         scale = min(1.0, _first_hit(self._normals[:, :2] @ (force_x, force_y), left))
-        return Wrench((force_x * scale, force_y * scale), torque)
+        return BodyWrench((force_x * scale, force_y * scale), torque)
 
-    def contains(self, wrench: Wrench, tolerance_n: float = 1e-9) -> bool:
+    def contains(self, wrench: BodyWrench, tolerance_n: float = 1e-9) -> bool:
         """Whether some duties between 0 and 1 make this wrench."""
         along = self._normals @ (*wrench.force_body_n, wrench.torque_nm)
         return bool((along <= self._reach + tolerance_n).all())
