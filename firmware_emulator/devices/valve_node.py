@@ -81,7 +81,7 @@ class ValveNode:
         self._is_air_on = vehicle.is_floating
         self._last_counter: int | None = None
         self._last_pulse_id: int | None = None
-        self._rejected = self._short_pulses = self._status_counter = 0
+        self._rejected = self._status_counter = 0
 
     @property
     def next_ns(self) -> int:
@@ -97,11 +97,6 @@ class ValveNode:
     def next_output_ns(self) -> int:
         """When it next sends something."""
         return min(self._status_ns, self._slow_ns)
-
-    @property
-    def short_pulses(self) -> int:
-        """Pulses not executed because they were shorter than the minimum on-time."""
-        return self._short_pulses
 
     def receive(self, stamp_ns: int, frame: CanFrame) -> None:
         """A frame that is complete on the bus at `stamp_ns`."""
@@ -165,8 +160,6 @@ class ValveNode:
                 self._vehicle.advance(now_ns)
                 self._vehicle.thrusters.energise(now_ns, valve)
                 self._off_ns[valve] = now_ns + on_ms * _MS
-            elif on_ms:
-                self._short_pulses += 1
 
     def _close(self, valves: list[int], now_ns: int) -> None:
         if valves:

@@ -1,7 +1,7 @@
 """The record stream: everything that a process published, many messages in one put.
 
 Recorder, view, console and bridges take this stream and cost the flight nothing: two thousand small puts a
-second through a hub cost far more than fifty large ones. A batch carries its own names, so that entries
+second through a hub cost far more than twenty large ones. A batch carries its own names, so that entries
 point at them by index and no table of topics is needed to read it.
 
 Layout, little endian: ``magic u32 | names u32 | entries u32 | causes u32 | lengths of names u16 ...`` then

@@ -31,7 +31,6 @@ ESTIMATE_HEADER = (
     "std_x_m,std_y_m,std_heading_rad\n"
 )
 FIXES_HEADER = "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis\n"
-PROGRESS_AFTER_S = 2.0
 INPUTS = ("imu.csv", "stars.csv", "meta.json", "truth.csv")
 
 

@@ -28,8 +28,6 @@ from groundstation.runners.tolerances import EXACT, Tolerances, load_tolerances
 
 app = typer.Typer(rich_markup_mode=None)
 
-_COUNTS = ("equal", "close", "different", "missing", "extra", "unrecorded")
-
 _WIDTH = 100  # on a pipe too: names are never cut
 
 

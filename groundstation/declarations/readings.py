@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from groundstation.declarations.view import NOTHING, Cell, Level, cell
+from groundstation.frames import wrap_angle
 
 ERROR_WINDOW_S = 30
 _SECOND_NS = 1_000_000_000
@@ -54,8 +55,7 @@ def distance(
     from_m: Iterable[float], from_heading_rad: float, to_m: Iterable[float], to_heading_rad: float
 ) -> tuple[float, float]:
     """Distance (m) and turn in [-pi, pi) (rad) from one pose to another."""
-    turn = (to_heading_rad - from_heading_rad + math.pi) % math.tau - math.pi
-    return math.dist(tuple(from_m), tuple(to_m)), turn
+    return math.dist(tuple(from_m), tuple(to_m)), wrap_angle(to_heading_rad - from_heading_rad)
 
 
 def pose_cell(position_m: float, heading_rad: float, level: Level = Level.PLAIN) -> Cell:

@@ -7,7 +7,7 @@ object, SI and radians; they are checked once, by the row.
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 from groundstation.declarations.message import PACKAGE, U32, Bool, Message, Text
@@ -110,7 +110,7 @@ class Action:
     name: str
     answered_by: str
     summary: str
-    arguments: tuple[Argument, ...] = field(default=())
+    arguments: tuple[Argument, ...] = ()
 
     def check(self, given: Mapping[str, object]) -> dict[str, Value]:
         """The arguments, complete and checked.

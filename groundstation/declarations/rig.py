@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
-from groundstation.declarations.vehicle_type import ValvesSection, VehicleType
+from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.files.errors import FileError
 from groundstation.fusion.levelling import levelling
 from groundstation.fusion.slope_grid import SlopeGrid, slope_grid
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 LABORATORY = "laboratory:"
 """Addresses that begin so are resolved by what the emulated laboratory announces."""
 MOCK_UP_RADIUS_M = 0.2  # a mock-up keeps this far from the edge of the table
+
+VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 
 S = TypeVar("S", bound=Section)
 
@@ -168,7 +170,7 @@ class Rig(Section):
     name: str
     table: TableSection
     mock_ups: dict[str, VehicleType]
-    vehicles: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")], VehicleSection] = Field(min_length=1)
+    vehicles: dict[VehicleName, VehicleSection] = Field(min_length=1)
     record: RecordSection = RecordSection()
     nodes: dict[str, NodeSection] = Field(default_factory=dict)
     laboratory: LaboratorySection | None = None
@@ -180,7 +182,7 @@ class Rig(Section):
         return self._source
 
     def keep_source(self, source: object) -> None:
-        """Keep what it was made from; for who reads it."""
+        """Keep what it was made from; called by what reads the rig."""
         self._source = source
 
     def section(self, kind: type[S]) -> S:
@@ -213,19 +215,3 @@ def check_address(rig: Rig, key: str, address: str | None) -> None:
     """
     if address is not None and address.startswith(LABORATORY) and rig.laboratory is None:
         raise ValueError(f"{key}: {address!r} needs a [laboratory] section")
-
-
-__all__ = [
-    "LABORATORY",
-    "MOCK_UP_RADIUS_M",
-    "HoldSection",
-    "LaboratorySection",
-    "NodeSection",
-    "RecordSection",
-    "Rig",
-    "TableSection",
-    "ValvesSection",
-    "VehicleSection",
-    "VehicleType",
-    "check_address",
-]

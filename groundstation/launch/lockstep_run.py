@@ -53,7 +53,10 @@ def run_lockstep(
     Raises:
         UsageError: The rig cannot run in lockstep, or the recording cannot be written.
     """
-    seed = seed_of(rig, seed)
+    try:
+        seed = seed_of(rig, seed)
+    except RigError as error:
+        raise RigError(f"{rig_path}: {error}") from error
     info = recording_info(rig, rig_text, rig_path, seed, utc_offset_ns=None)
     try:
         recorder = Recorder(recording, info)

@@ -4,6 +4,9 @@ from collections.abc import Iterable
 
 from groundstation.declarations.port import READ_TIMEOUT_S, Edge
 
+STREAM_BAUD = 115200
+"""For streams that a socket usually carries; sockets ignore it."""
+
 
 class ByteEdge(Edge):
     """A serial port or socket.
@@ -37,7 +40,7 @@ class ByteEdge(Edge):
 
 
 class CameraEdge(Edge):
-    """A camera, newest frame first.
+    """A camera; frames that nobody read before the next one came are lost.
 
     Args:
         source: Device index, path, URL or folder.

@@ -47,8 +47,8 @@ class Recorded(NamedTuple):
     """One recorded message, not yet decoded; a named tuple, since a recording holds millions.
 
     Attributes:
-        envelope: Topic, owner, sequence and moment of publication; what the publisher's clock measured
-            (``wall_ns``, ``cpu_ns``, causes) stands in the journal.
+        envelope: Topic, owner, sequence and moment of publication. Wall time and causes are in the journal
+            (``CauseIndex``); CPU time is not recorded.
         data: CDR bytes of the payload.
         log_ns: Log time.
         decode: Makes the payload of its class by the file's own schema.

@@ -24,7 +24,7 @@ class Recovery:
     Attributes:
         messages: Messages brought over.
         torn_bytes: Bytes at the end of the file that are no whole record.
-        damaged_chunks: Complete chunks that could not be unpacked; their messages are lost.
+        damaged_chunks: Chunks, the torn one included, that could not be unpacked; their messages are lost.
         orphans: Messages lost because the name of their channel stood in a damaged chunk.
         was_finished: The file had been finished properly.
     """

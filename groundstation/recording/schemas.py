@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import fields, make_dataclass
 from typing import Annotated, Any
 
-from groundstation.bus.cdr import Codec, CodecError, codec_of
+from groundstation.bus.cdr import Codec, codec_of
 from groundstation.bus.ros_schema import is_standard, message_text, schema_text
 from groundstation.declarations.message import Message
 from groundstation.recording.errors import RecordingError
@@ -65,6 +65,3 @@ def _fields(text: str) -> list[tuple[str, str]]:
     own = text.partition("=" * 80)[0]
     rows = (line.split(" ", 1) for line in own.splitlines() if line.strip())
     return [(name.strip(), ros_type) for ros_type, name in rows if ros_type != "std_msgs/Header"]
-
-
-__all__ = ["CodecError", "Decode", "decoder_of"]

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import Field, create_model
 
 from groundstation.declarations.errors import UsageError
-from groundstation.declarations.rig import Rig, VehicleSection, VehicleType
+from groundstation.declarations.rig import Rig, VehicleName, VehicleSection
 from groundstation.declarations.section import Section
 from groundstation.declarations.tables import Tables
+from groundstation.declarations.vehicle_type import VehicleType
 
 _PLACES: Mapping[type[Section], str] = {
     VehicleSection: "a vehicle",
@@ -29,10 +30,9 @@ def rig_model(tables: Tables) -> type[Rig]:
     vehicle = _joined("Vehicle", VehicleSection, {part.name: part.vehicle for part in parts})
     mock_up = _joined("VehicleType", VehicleType, {part.name: part.mock_up for part in parts})
     top = _joined("Rig", Rig, {part.name: part.rig for part in parts})
-    name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     fields: dict[str, Any] = {
         "mock_ups": (dict[str, mock_up], ...),  # type: ignore[valid-type]  # made at run time
-        "vehicles": (dict[name, vehicle], Field(min_length=1)),  # type: ignore[valid-type]
+        "vehicles": (dict[VehicleName, vehicle], Field(min_length=1)),  # type: ignore[valid-type]
     }
     composed: type[Rig] = create_model("Rig", __base__=top, **fields)
     composed.tables = tables

@@ -91,11 +91,6 @@ class LiveProcess:
         own = [thread.port for thread in self._threads.values()]
         self._step = Step(process, slots, own, journal, sequences, self)
 
-    @property
-    def undecodable(self) -> int:
-        """Messages from the bus that were none of ours."""
-        return self._decoder.undecodable
-
     def stop(self) -> None:
         """Ask the loop to end; safe in a signal handler and from any thread."""
         self._stopping.set()

@@ -64,11 +64,18 @@ def make_runner(
 
 
 def seed_of(rig: Rig, seed: int | None) -> int:
-    """The seed asked for, else the rig's, else ``DEFAULT_SEED``."""
+    """The seed asked for, else the rig's, else ``DEFAULT_SEED``.
+
+    Raises:
+        RigError: The rig's seed is no whole number from 0 up.
+    """
     if seed is not None:
         return seed
     table = rig.laboratory.table if rig.laboratory is not None else {}
-    return int(table.get("seed", DEFAULT_SEED))
+    found = table.get("seed", DEFAULT_SEED)
+    if not isinstance(found, int) or isinstance(found, bool) or found < 0:
+        raise RigError(f"laboratory.seed: expected a whole number from 0 up, found {found!r}")
+    return found
 
 
 def _sentence(error: ValidationError) -> str:

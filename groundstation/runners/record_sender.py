@@ -1,6 +1,7 @@
 """Sends a process's record stream from a thread of its own: a slow recorder never delays the flight."""
 
 import queue
+import sys
 import threading
 
 import zenoh
@@ -9,7 +10,7 @@ from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 
 MOST_BYTES = 64 << 20
-"""What may wait in memory for a recorder that has stopped; beyond that batches are dropped and counted."""
+"""What may wait in memory for a recorder that has stopped; batches beyond that are dropped and reported."""
 _CLOSE_S = 1.0
 
 
@@ -42,12 +43,16 @@ class RecordSender:
         with self._lock:
             if self._waiting_bytes + len(batch) > MOST_BYTES:
                 self.dropped += 1
+                if self.dropped == 1:
+                    sys.stderr.write(f"not recorded: batches, since more than {MOST_BYTES >> 20} MiB wait\n")
                 return
             self._waiting_bytes += len(batch)
         self._queue.put(batch)
 
     def close(self) -> None:
-        """Send what waits, then end."""
+        """Send what waits, then end; report how many batches were dropped."""
+        if self.dropped:
+            sys.stderr.write(f"not recorded: {self.dropped} batches in all\n")
         self._queue.put(None)
         self._thread.join(_CLOSE_S)
 

@@ -10,10 +10,10 @@ class Difference:
     Attributes:
         sequence: Of the recorded message.
         stamp_ns: Of the recorded payload.
-        field: Name of the field; ``topic`` where another topic was said.
+        field: Name of the field; ``topic`` where it was published on another topic.
         recorded: The recorded value.
         replayed: The replayed value.
-        apart: Largest difference of numbers, None where the values are not comparable ones.
+        apart: Largest difference of numbers, None where the values are no numbers or differ in shape.
     """
 
     sequence: int
@@ -41,9 +41,9 @@ class TopicResult:
         equal: Payloads equal bit for bit.
         close: Payloads that differ within the tolerances.
         different: Payloads that differ beyond them.
-        missing: Payloads recorded which the node did not say in the replay.
-        extra: Payloads the node said only in the replay.
-        unrecorded: Payloads said in both, of which the recorder kept no copy to compare with.
+        missing: Payloads recorded that the node did not publish in the replay.
+        extra: Payloads that the node published only in the replay.
+        unrecorded: Payloads published in both, of which the recorder kept no copy to compare with.
         first: The first difference.
     """
 
@@ -70,9 +70,9 @@ class ReplayReport:
     Attributes:
         nodes: Keys of the nodes that were replayed.
         refused: Keys of nodes that could not be, with one sentence each.
-        results: Per topic and owner, in the order of the topic table.
+        results: Per topic and owner, sorted by their names.
         inputs: Messages handed to nodes.
-        ticks: Ticks told to nodes.
+        ticks: Ticks of nodes.
         before_start: Journal entries of nodes before their first recorded start: left out.
         missing_inputs: Messages a node had consumed that are not in the recording, by ``node <- topic``.
     """

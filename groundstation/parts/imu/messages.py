@@ -64,9 +64,6 @@ class ImuRaw(Message):
 
 
 USABLE_RATE, USABLE_FORCE_X, USABLE_FORCE_Y = 1, 2, 4
-
-
-USABLE_ALL = 7
 """Bits of `Imu.usable`."""
 
 

@@ -8,12 +8,10 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.port import Edge, Port, PortRow
 from groundstation.declarations.rig import Rig, check_address
 from groundstation.declarations.section import Section
-from groundstation.parts.edges import ByteEdge
+from groundstation.parts.edges import STREAM_BAUD, ByteEdge
 from groundstation.parts.reference.gauges import GAUGES, EstimateFigure
 from groundstation.parts.reference.messages import ReferenceBytes, ReferenceState
 from groundstation.parts.reference.reference_reader import ReferenceReader
-
-STREAM_BAUD = 115200  # sockets ignore it
 
 
 class ReferenceOfVehicle(Section):

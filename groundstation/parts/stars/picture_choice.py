@@ -8,8 +8,9 @@ LONGEST_NS = 32 * NS_PER_S
 class PictureChoice:
     """Chooses pictures by their stamps alone, so that a replay chooses the same.
 
-    A refusal with another reason than the last one is shown after a second; the same reason again after
-    two, four, ... seconds, 32 at most. A fix ends the row. A request is met by the next picture.
+    The first refusal for a reason is kept at once, or a second after the last picture that was kept; further
+    ones for the same reason follow after gaps of 1, 2, 4, ... 32 s. A fix starts this anew. A request is
+    met by the next picture, whatever became of it.
     """
 
     def __init__(self) -> None:

@@ -6,10 +6,8 @@ from drivers.laboratory import CameraFrame
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Edge, Port
 from groundstation.declarations.topic import Delivery
-from groundstation.parts.edges import ByteEdge, CameraEdge
+from groundstation.parts.edges import STREAM_BAUD, ByteEdge, CameraEdge
 from groundstation.parts.stars.messages import FixBytes, StarImage
-
-STREAM_BAUD = 115200  # sockets ignore it
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from groundstation.control.mux import MuxConfig
 from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
-from groundstation.declarations.rig import LABORATORY, Rig
+from groundstation.declarations.rig import LABORATORY, Rig, check_address
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.parts.valves.actions import FLOAT_AIR, GUARD, MULTIPLEXER
 from groundstation.parts.valves.allocation_node import AllocationNode
@@ -78,8 +78,7 @@ def _check(rig: Rig) -> None:
     if isinstance(bus, str):
         if not bus.startswith(LABORATORY):
             raise ValueError(f"valve_bus: expected a table with 'interface' and 'channel', found {bus!r}")
-        if rig.laboratory is None:
-            raise ValueError(f"valve_bus: {bus!r} needs a [laboratory] section")
+        check_address(rig, "valve_bus", bus)
     else:
         import can
 

@@ -48,6 +48,9 @@ WRONG = {
     "a typo in the laboratory's table": (
         DRAWN.replace("tilt_rad", "tild_rad"), "laboratory.table.tild_rad",
     ),
+    "a seed that is no number": (
+        DRAWN.replace("seed = 1", 'seed = "one"'), "laboratory.seed: expected a whole number", "found 'one'",
+    ),
     "a laboratory without the channel": (
         DRAWN.replace("laboratory:alpha/imu", "laboratory:gamma/imu"), "no channel 'gamma/imu'",
     ),
