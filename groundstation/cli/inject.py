@@ -21,7 +21,7 @@ def inject(
     vehicle: Annotated[str, typer.Argument(help="Name of the vehicle, as in the rig file.")],
     failure: Annotated[str, typer.Argument(help="Row of the laboratory's table of failures.")],
     for_s: Annotated[float, typer.Option("--for", help="How long, seconds.", min=0.001)] = 10.0,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1)] = 3.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1, max=3600)] = 3.0,
     pid: Annotated[int | None, typer.Option(help="Process of the run, where several are going on.")] = None,
 ) -> None:
     """Inject a failure into the emulated laboratory of a running rig, e.g. --valve 3.

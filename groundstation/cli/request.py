@@ -37,7 +37,7 @@ def request(
     arguments: Annotated[
         list[str] | None, typer.Argument(help="In their order, or as name=value; metres, and degrees.")
     ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1)] = 3.0,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1, max=3600)] = 3.0,
     pid: Annotated[int | None, typer.Option(help="Process of the run, where several are going on.")] = None,
 ) -> None:
     """Ask something of a running vehicle and print the answer.

@@ -30,6 +30,8 @@ from groundstation.launch.forking import LOADED, PID, serve
 
 ANSWER_WITHIN_S = 10.0
 """A server that still loads what it needs answers late; one that takes longer is given up."""
+FORK_WITHIN_S = 2.0
+"""One that has loaded forks in milliseconds; whoever supervises is not kept longer by one that hangs."""
 
 _SET_CHILD_SUBREAPER = 36  # <sys/prctl.h>
 
@@ -200,6 +202,7 @@ class ForkServer:
             raise ConnectionError("it was not started")
         if not self._is_loaded:
             self._is_loaded = self._socket.recv(len(LOADED)) == LOADED
+        self._socket.settimeout(FORK_WITHIN_S)
         socket.send_fds(self._socket, [b"f"], descriptors)
         answer = self._socket.recv(PID.size)
         if len(answer) != PID.size:

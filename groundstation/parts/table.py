@@ -44,7 +44,7 @@ def _load(point: EntryPoint) -> Part:
     where = f"the part {point.name!r} of the package {package} ({point.value})"
     try:
         part = point.load()
-    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+    except (Exception, SystemExit) as error:  # whatever somebody else's package raises: it is named, once
         raise UsageError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(part, Part):
         raise UsageError(f"{where} is a {type(part).__name__}, expected a Part")

@@ -7,6 +7,7 @@ and the reader recovers the rest. The file is called ``….part`` until it is fi
 Nothing here reads a clock, so that two equal runs in virtual time give equal bytes.
 """
 
+import contextlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -66,9 +67,13 @@ class Recorder:
         self._schemas: dict[str, int] = {}
         self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
         self._file: BinaryIO | None = _open_new(path, self.part_path)
-        self._writer = McapFile(self._file, profile="ros2", library=software())
-        self._writer.add_metadata(METADATA_NAME, info.to_metadata())
-        self._file.flush()
+        try:
+            self._writer = McapFile(self._file, profile="ros2", library=software())
+            self._writer.add_metadata(METADATA_NAME, info.to_metadata())
+            self._file.flush()
+        except OSError:
+            self._abandon()  # nothing is in it that could be recovered
+            raise
 
     def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
@@ -150,6 +155,13 @@ class Recorder:
             self._file.close()
             self._file = None
             self.part_path.unlink()
+
+    def _abandon(self) -> None:
+        """Remove a file that could not be begun; what is still buffered cannot be written either."""
+        with contextlib.suppress(OSError):
+            self.discard()
+        self._file = None
+        self.part_path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self

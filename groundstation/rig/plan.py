@@ -10,6 +10,8 @@ from groundstation.declarations.port import Port
 from groundstation.declarations.rig import LABORATORY, Rig
 
 RECORDER = "recorder"
+NOT_VEHICLES = frozenset({"rig", "record", "alive"})
+"""First words of keys on the bus that stand for something else than a vehicle."""
 
 
 class Placed(NamedTuple):
@@ -104,6 +106,9 @@ def check_plan(rig: Rig) -> None:
     clash = set(processes_of(rig)) & set(rig.vehicles)
     if clash:
         raise RigError(f"'{clash.pop()}' names both a vehicle and a process: choose another vehicle name")
+    taken = NOT_VEHICLES & set(rig.vehicles)
+    if taken:
+        raise RigError(f"'{min(taken)}' has a meaning on the bus: choose another vehicle name")
 
 
 def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:

@@ -39,6 +39,13 @@ def test_what_cannot_be_asked_is_refused(words, reason, capsys):
     assert reason in refused(capsys, *words)
 
 
+@pytest.mark.parametrize("words", [["request", "alpha", "stop"], ["inject", "alpha", "dead_sky"]])
+@pytest.mark.parametrize("seconds", ["inf", "1e30", "nan", "0"])
+def test_a_wait_without_end_is_refused(words, seconds, capsys):
+    assert call([*words, "--timeout", seconds]) == 2
+    assert "Invalid value for '--timeout'" in capsys.readouterr().err
+
+
 def test_the_vehicle_must_be_flown_by_exactly_one_run(capsys):
     RunningRig(os.getpid(), "one", "tcp/127.0.0.1:1", ("alpha", "beta")).announce()
     RunningRig(os.getppid(), "other", "tcp/127.0.0.1:2", ("alpha",)).announce()

@@ -54,6 +54,12 @@ WRONG = {
     "a laboratory without the channel": (
         DRAWN.replace("laboratory:alpha/imu", "laboratory:gamma/imu"), "no channel 'gamma/imu'",
     ),
+    "a vehicle called like the rig's own topics": (
+        DRAWN.replace("alpha", "rig"), "'rig' has a meaning on the bus",
+    ),
+    "a vehicle called like the record stream": (
+        DRAWN.replace("alpha", "record"), "'record' has a meaning on the bus",
+    ),
     "a vehicle called like a process": (
         DRAWN.replace("alpha", "commands"), "names both a vehicle and a process",
     ),

@@ -185,3 +185,15 @@ def test_a_launcher_without_threads_forks_itself_and_takes_all_with_it_when_it_i
     assert launcher.stdout.read() == b""  # nobody else holds it open
     launcher.stdin.close()
     launcher.stdout.close()
+
+
+def test_a_server_that_hangs_is_replaced_before_a_person_grows_impatient(server, fork):
+    first = fork(SAY_AND_WAIT)
+    assert first.stderr.readline() == b"here\n"
+    hanging = server.pid
+    os.kill(hanging, signal.SIGSTOP)
+    begin_s = time.monotonic()
+    assert fork(SAY_AND_WAIT).stderr.readline() == b"here\n"
+    assert time.monotonic() - begin_s < 8.0  # two seconds, and the start of an interpreter
+    assert server.pid != hanging
+    assert first.poll() is None

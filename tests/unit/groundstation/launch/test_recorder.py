@@ -113,3 +113,21 @@ def test_a_full_disk_ends_it_with_one_sentence_and_what_was_written_stays(tmp_pa
     recover(path.with_name("run.mcap.part"), tmp_path / "whole.mcap")
     with Recording(tmp_path / "whole.mcap") as recording:
         assert next(iter(recording.delivered([Latency], ["alpha"]))).envelope.sequence == 0
+
+
+def test_a_recording_that_a_full_disk_lets_nobody_begin_leaves_no_file(tmp_path):
+    script = (
+        "import resource, signal, sys, pathlib; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "from groundstation.recording.writer import Recorder;"
+        "from groundstation.recording.info import RecordingInfo;"
+        "from groundstation.recording.policy import ImagePolicy;"
+        "info = RecordingInfo('name = 1', '', ImagePolicy.OFF, {}, None);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4, 4));"
+        "Recorder(pathlib.Path(sys.argv[1]), info)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "run.mcap")], capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1] == "OSError: [Errno 27] File too large"
+    assert list(tmp_path.iterdir()) == []
