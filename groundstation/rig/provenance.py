@@ -1,4 +1,4 @@
-"""What a recording of a rig says about itself."""
+"""What a recording of a rig states about itself."""
 
 from pathlib import Path
 

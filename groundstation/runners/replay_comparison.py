@@ -151,10 +151,10 @@ def load_tolerances(path: Path, payloads: Mapping[str, type[Message]]) -> Tolera
         UsageError: The file cannot be read, or names a topic or field that does not exist.
     """
     try:
-        said = tomllib.loads(path.read_text())
+        reported = tomllib.loads(path.read_text())
     except (OSError, ValueError) as error:
         raise UsageError(f"{path}: cannot be read as tolerances ({error})") from error
-    for noun, table in said.items():
+    for noun, table in reported.items():
         try:
             known = dict(ros_fields(payloads[noun]))
         except KeyError:
@@ -166,7 +166,7 @@ def load_tolerances(path: Path, payloads: Mapping[str, type[Message]]) -> Tolera
                 raise UsageError(f"{path}: {noun}.{name} is no field of floating-point numbers")
             if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0:
                 raise UsageError(f"{path}: {noun}.{name}: expected a number from 0 up, found {value!r}")
-    return said
+    return reported
 
 
 def _bits(value: object) -> object:

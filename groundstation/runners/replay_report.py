@@ -10,7 +10,7 @@ class Difference:
     Attributes:
         sequence: Of the recorded message.
         stamp_ns: Of the recorded payload.
-        field: Name of the field; ``topic`` where another topic was said.
+        field: Name of the field; ``topic`` where another topic was reported.
         recorded: The recorded value.
         replayed: The replayed value.
     """
@@ -38,9 +38,9 @@ class TopicResult:
         equal: Payloads equal bit for bit.
         close: Payloads that differ within the tolerances.
         different: Payloads that differ beyond them.
-        missing: Payloads recorded which the node did not say in the replay.
-        extra: Payloads the node said only in the replay.
-        unrecorded: Payloads said in both, of which the recorder kept no copy to compare with.
+        missing: Payloads recorded which the node did not state it in the replay.
+        extra: Payloads the node reported only in the replay.
+        unrecorded: Payloads reported in both, of which the recorder kept no copy to compare with.
         first: The first difference.
     """
 

@@ -1,4 +1,4 @@
-"""What a rig says of range finders."""
+"""What a rig states of range finders."""
 
 from groundstation.declarations.section import NonNegative, Positive, Section
 

@@ -1,4 +1,4 @@
-"""What a rig says of estimators."""
+"""What a rig states of estimators."""
 
 from typing import Self
 

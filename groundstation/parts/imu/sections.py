@@ -1,4 +1,4 @@
-"""What a rig says of IMU blocks."""
+"""What a rig states of IMU blocks."""
 
 from typing import Literal
 

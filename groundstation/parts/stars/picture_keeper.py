@@ -1,4 +1,4 @@
-"""Picture keeper: holds the last frames, and says those that the star tracker has something to say of."""
+"""Picture keeper: holds the last frames, and publishes those that the star tracker reports on."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ class PictureKeeper(Node):
     """Adds the picture to every ``StarMatches``, without loss, so that it can be solved again.
 
     It is no part of the way from light to fix: a picture of 640 x 480 takes some 10 ms to compress, and
-    the star tracker chooses at most one a second. A frame that is no longer held is not said.
+    the star tracker chooses at most one a second. A frame that is no longer held is not reported.
     """
 
     inputs = (StarImage, StarMatches)

@@ -1,4 +1,4 @@
-"""What a rig says of the valve bus."""
+"""What a rig states of the valve bus."""
 
 from typing import Any
 
