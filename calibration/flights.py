@@ -87,7 +87,7 @@ def opened(source: Path, rig_path: Path | None = None) -> Iterator[tuple[Recordi
 
 
 def fuse(recording: Recording, rig: Rig, vehicle: str, estimator: Estimator) -> None:
-    """Replay the fusion node of a vehicle with another estimator: it is told what it was told then.
+    """Replay the fusion node of a vehicle with another estimator: it is given what it was given then.
 
     Raises:
         UsageError: The recording holds no fusion of this vehicle, or not what it received.

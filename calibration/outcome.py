@@ -20,7 +20,7 @@ Note = float | int | str | bool | Sequence[str]
 
 
 class CalibrationRefusedError(ValueError):
-    """The data do not give the calibration; the message is one sentence that says what is missing."""
+    """The data do not give the calibration; the message is one sentence that states what is missing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

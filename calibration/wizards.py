@@ -89,7 +89,7 @@ def load_wizard(name: str) -> Wizard:
 
 
 class GuideNode(Node):
-    """Leads a guide as a node among others: what it is told is journaled, what it asks for is recorded.
+    """Leads a guide as a node among others: what it is given is journaled, what it asks for is recorded.
 
     Args:
         vehicle: Which one.

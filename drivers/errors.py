@@ -5,7 +5,7 @@
     DeviceError
     ├── NotFound    nothing is there under that name
     ├── LinkLost    it was there and went away, or fell silent (also a TimeoutError)
-    └── Refused     it is there and says no: busy, locked, no permission, bad setting
+    └── Refused     it is there and refuses: busy, locked, no permission, bad setting
 
 Every error carries one sentence that an operator can act on. Line noise is not an error: it is counted.
 """

@@ -59,7 +59,7 @@ class Waypoints(Node):
                 yield Request(now_ns, self.vehicle, self._requests, self._author, "go_to", arguments)
 
     def _is_reached(self, status: ControlStatus) -> bool:
-        """Whether the vehicle is at its goal; a status of the goal before says nothing of the new one."""
+        """Whether the vehicle is at its goal; a status of the goal before states nothing of the new one."""
         if self._goal is not None and math.dist(status.goal_position_table_m, self._goal[:2]) > 1e-9:
             return False
         return status.error_position_m < self._near_m and abs(status.error_heading_rad) < self._near_rad

@@ -1,6 +1,6 @@
 """`python -m firmware_emulator RIG.toml`: the laboratory that is not there, in real time.
 
-Prints one JSON line that says where each channel can be opened, then serves until SIGTERM, SIGINT or, if
+Prints one JSON line that states where each channel can be opened, then serves until SIGTERM, SIGINT or, if
 stdin is a pipe, its end.
 """
 

@@ -22,7 +22,7 @@ SettingsT = TypeVar("SettingsT", bound=Settings)
 
 
 class Runner(Protocol):
-    """A state machine that says when it next does something."""
+    """A state machine that states when it next does something."""
 
     @property
     def next_ns(self) -> int:

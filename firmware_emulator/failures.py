@@ -106,7 +106,7 @@ def checked(kind: str, given: Mapping[str, float], kinds: Mapping[str, FailureKi
     """All parameters of a failure, defaults filled in.
 
     Raises:
-        ValueError: There is no such kind or parameter, or a value is impossible; one sentence says which.
+        ValueError: There is no such kind or parameter, or a value is impossible; one sentence names it.
     """
     if kind not in kinds:
         raise ValueError(f"no failure of kind {kind!r}; the kinds are {', '.join(kinds)}")

@@ -87,10 +87,12 @@ def run(arguments: argparse.Namespace) -> list[Row]:
                     say=status.update,
                 )
                 found = MEASURES[name](bench)
-            said = f"{bench_table.machine()}; {bench.circumstances()}."
-            print(f"\n{name}: {said}\n{bench_table.text(found)}", flush=True)
+            reported = f"{bench_table.machine()}; {bench.circumstances()}."
+            print(f"\n{name}: {reported}\n{bench_table.text(found)}", flush=True)
             if arguments.write is not None:
-                bench_table.write(arguments.write, {name: bench_table.section(said, found)}, list(MEASURES))
+                bench_table.write(
+                    arguments.write, {name: bench_table.section(reported, found)}, list(MEASURES)
+                )
             rows += found
     return rows
 

@@ -56,20 +56,20 @@ class Flight:
     def __call__(self, delivered: Delivered, now_ns: int) -> None:
         """Take one message."""
         del now_ns
-        said = delivered.payload
-        t_s = said.stamp_ns * 1e-9
-        match said:
+        reported = delivered.payload
+        t_s = reported.stamp_ns * 1e-9
+        match reported:
             case ReferenceState():
-                self.truth.setdefault(said.vehicle, []).append(
-                    (t_s, *said.position_table_m, said.heading_rad)
+                self.truth.setdefault(reported.vehicle, []).append(
+                    (t_s, *reported.position_table_m, reported.heading_rad)
                 )
             case VehicleState(status="flying"):
-                row = (t_s, *said.position_table_m, said.heading_rad, *said.pose_sigma)
-                self.state.setdefault(said.vehicle, []).append(row)
+                row = (t_s, *reported.position_table_m, reported.heading_rad, *reported.pose_sigma)
+                self.state.setdefault(reported.vehicle, []).append(row)
             case StarImage():
-                self.images[said.vehicle] = said
+                self.images[reported.vehicle] = reported
             case ValveCommand():
-                self.open_mask[said.vehicle] = said.open_mask
+                self.open_mask[reported.vehicle] = reported.open_mask
 
 
 def to_table(pose: Array, points_body_m: Array) -> Array:
@@ -179,8 +179,8 @@ def compose(flight: Flight, path: Path) -> None:
     """Put the three panels together."""
     catalogue = StarCatalogue.load(CALIBRATION / "ceiling.csv")
     tracker = StarTracker(catalogue, CameraCalibration.load(CALIBRATION / "camera.json"))
-    said = flight.images["alpha"]
-    image = np.frombuffer(said.data, np.uint8).reshape(said.height, said.width)
+    reported = flight.images["alpha"]
+    image = np.frombuffer(reported.data, np.uint8).reshape(reported.height, reported.width)
     spots = detect(image)
     fix = tracker.solve(spots)
     assert isinstance(fix, PictureFix), fix

@@ -99,7 +99,7 @@ def tilt(
 
     Either set the landed vehicle on gauge blocks, tilted along x and along y, both ways, and write the tilts
     down (--tilts). Or tilt the table by some mrad and land the vehicle at eight headings: the stars say them.
-    Then the common scale and turn of both axes stay unknown unless --table-map says how the table pulls.
+    Then the common scale and turn of both axes stay unknown unless --table-map states how the table pulls.
     Rests are found by themselves; knocks and touches in them are named and cut out.
 
     Example: groundstation calibrate tilt level.mcap tilted.mcap --tilts tilts.csv --out tilt.toml

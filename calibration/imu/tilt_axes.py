@@ -3,7 +3,7 @@
 At rest reading = b + A f with the specific force f along the block's true axes: g sin(angle above the
 horizontal) of each axis on gauge blocks, -R(heading)^T slope on a table. A = 1 + E holds scale and axes; b, E
 and what is not known of the slope are fitted together by weighted least squares with wide priors, so that
-what the rests do not show keeps its prior's sigma and is said to be unknown.
+what the rests do not show keeps its prior's sigma and is reported as unknown.
 """
 
 from __future__ import annotations

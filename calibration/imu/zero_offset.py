@@ -31,7 +31,7 @@ CHANNELS = ("omega", "ax", "ay")
 
 
 class NotARest(CalibrationRefusedError):  # noqa: N818 - it is a finding about the recording
-    """The recording does not hold a rest; the text says what was found."""
+    """The recording does not hold a rest; the text states what was found."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ def pose_by_board(
     """Find the pose of the camera from pictures of a board on the table.
 
     Args:
-        views: Corners, and where the tape says that the board lay.
+        views: Corners, and where the tape states that the board lay.
         lens: The camera; its pose is a guess.
         tape_sigma_m: How well places were measured.
         tape_sigma_rad: How well headings were.

@@ -15,7 +15,7 @@ from groundstation.files.number_tables import load_table
 Array = NDArray[np.float64]
 
 GUESS_S = 0.05
-"""Of the delay, where no rig says one."""
+"""Of the delay, where no rig states one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

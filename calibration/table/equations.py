@@ -102,7 +102,7 @@ def flight_equations(log: FlightLog, field: Field, priors: FlightPriors) -> Flig
     for innovation in innovations(log, field, priors.bias_walk_m_s2_rts):
         fixes += innovation.is_fix
         if innovation.covariance.trace() > 1.0:
-            continue  # the first fix, which only says where the motion starts
+            continue  # the first fix, which only states where the motion starts
         root = np.linalg.cholesky(innovation.covariance)
         white = solve_triangular(
             root, np.column_stack([innovation.value, innovation.columns]), lower=True, check_finite=False

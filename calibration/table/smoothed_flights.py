@@ -38,7 +38,7 @@ class Source:
     path: Path
     logs: tuple[FlightLog, ...]
     bounds_m: Bounds | None
-    """Of the table, where the rig says."""
+    """Of the table, where the rig states."""
     legs_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Where the legs stand, likewise."""
 

@@ -18,7 +18,7 @@ from calibration.table.surface_basis import SurfaceBasis
 Array = NDArray[np.float64]
 
 TYPICAL_WAVINESS_M_S2, WAVINESS_FACTOR = 3e-4, 2.0
-"""Median of the waviness of tables, and the factor that is one sigma; keeps sparse data from saying none."""
+"""Median of the waviness of tables, and the factor that is one sigma; keeps sparse data from stating none."""
 TYPICAL_LENGTH_M, LENGTH_FACTOR = 0.6, 2.0
 
 

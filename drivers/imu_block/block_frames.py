@@ -1,4 +1,4 @@
-"""What the IMU block says: sample frames and replies, as plain frozen values in sensor counts."""
+"""What the IMU block states: sample frames and replies, as plain frozen values in sensor counts."""
 
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag

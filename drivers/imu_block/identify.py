@@ -21,13 +21,13 @@ _FRAMES_TO_KNOW = 3
 
 @dataclass(frozen=True, slots=True)
 class PortReport:
-    """What one port said.
+    """What one port reported.
 
     Attributes:
         url: the port.
         baud: bit rate at which the rest was found, the first one tried if nothing was.
-        version: frame version heard, None if none.
-        identity: what the block said of itself; v1 blocks cannot.
+        version: frame version received, None if none.
+        identity: what the block reported of itself; v1 blocks cannot.
         frames_heard: sample frames while listening.
         counters: of the parser.
         problem: why the port could not be asked, or None.
@@ -37,7 +37,7 @@ class PortReport:
     baud: int
     version: int | None
     identity: Identity | None
-    frames_heard: int
+    frames_received: int
     counters: ParserCounters
     problem: str | None = None
 
@@ -105,15 +105,15 @@ def ask_url(url: str, *, bauds: tuple[int, ...] = BAUDS, listen_s: float = LISTE
     for baud in bauds:
         try:
             with SerialPort(url, baud) as port:
-                heard = ask(port, listen_s=listen_s)
+                received = ask(port, listen_s=listen_s)
         except LinkLost as error:
             return _problem(url, baud, str(error))
         except DeviceError as error:
             return report or _problem(url, baud, str(error))
-        if heard.is_imu_block:
-            return heard
-        if report is None or heard.counters.bytes_seen > report.counters.bytes_seen:
-            report = heard
+        if received.is_imu_block:
+            return received
+        if report is None or received.counters.bytes_seen > report.counters.bytes_seen:
+            report = received
         if url.startswith("socket://"):
             break  # a socket has no bit rate
     assert report is not None

@@ -186,7 +186,7 @@ def _reported(status: Status) -> int:
 
 @dataclass(slots=True)
 class Environment:
-    """The multiplexed slow quantities, as last heard: NaN until then, and for ever with v1.
+    """The multiplexed slow quantities, as last received: NaN until then, and for ever with v1.
 
     Attributes:
         temperature_gyro_c, temperature_tilt_x_c, temperature_tilt_y_c: chip temperatures, degC.

@@ -27,15 +27,15 @@ def parse_announcement(line: str) -> dict[str, Address] | None:
     """The addresses of an announcement line; None for any other line, which is log output.
 
     Raises:
-        ValueError: The line says `announce` but not in the documented form.
+        ValueError: The line states `announce` but not in the documented form.
     """
     try:
-        said = json.loads(line)
+        reported = json.loads(line)
     except ValueError:
         return None
-    if not isinstance(said, dict) or "announce" not in said:
+    if not isinstance(reported, dict) or "announce" not in reported:
         return None
-    addresses = said["announce"]
+    addresses = reported["announce"]
     if not isinstance(addresses, dict):
         raise ValueError(f"an announcement maps channels to addresses, got {type(addresses).__name__}")
     for channel, address in addresses.items():

@@ -2,7 +2,7 @@
 
 Two ways to the same laboratory. In lockstep the runner drives it in virtual time through `Laboratory`,
 found by name among the installed entry points and never imported by it. Live it is a child process
-that prints one `announcement line` on stdout, saying where each of its channels can be opened; from
+that prints one `announcement line` on stdout, stating where each of its channels can be opened; from
 then on it is hardware like any other.
 """
 
@@ -40,7 +40,7 @@ class Arrival:
         stamp_ns: Host monotonic clock (virtual in lockstep) at which the last byte was there.
         channel: `<vehicle>/<device>` or a device all vehicles share: `alpha/imu`, `alpha/star_camera`,
             `alpha/reference`, `valve_bus`. The laboratory's own channel is `laboratory`.
-        data: What the channel's kind says.
+        data: What the channel's kind states.
     """
 
     stamp_ns: int

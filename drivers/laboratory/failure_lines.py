@@ -25,7 +25,7 @@ MAX_LINE_BYTES = 4096
 
 @dataclass(frozen=True, slots=True)
 class FailureEvent:
-    """An injected failure has begun or ended; the arrival's stamp says when.
+    """An injected failure has begun or ended; the arrival's stamp states when.
 
     Attributes:
         kind: A row of the laboratory's table of failures.
@@ -94,17 +94,20 @@ def parse_event(line: str | bytes) -> FailureEvent | FailureRefused:
     """The event in a line of the laboratory.
 
     Raises:
-        ValueError: The line is no event; the message says why in one sentence.
+        ValueError: The line is no event; the message gives the reason in one sentence.
     """
-    said = _parse(line)
-    if "refused" in said:
-        _check_keys(said, {"refused"}, set())
-        return FailureRefused(_text(said, "refused"))
-    _check_keys(said, {"failure", "vehicle", "parameters", "is_active"}, set())
-    if not isinstance(said["is_active"], bool):
-        raise ValueError(f"is_active must be true or false, got {said['is_active']!r}")
+    reported = _parse(line)
+    if "refused" in reported:
+        _check_keys(reported, {"refused"}, set())
+        return FailureRefused(_text(reported, "refused"))
+    _check_keys(reported, {"failure", "vehicle", "parameters", "is_active"}, set())
+    if not isinstance(reported["is_active"], bool):
+        raise ValueError(f"is_active must be true or false, got {reported['is_active']!r}")
     return FailureEvent(
-        _text(said, "failure"), _text(said, "vehicle"), _parameters(said), is_active=said["is_active"]
+        _text(reported, "failure"),
+        _text(reported, "vehicle"),
+        _parameters(reported),
+        is_active=reported["is_active"],
     )
 
 
@@ -112,21 +115,21 @@ def parse_order(line: str | bytes) -> InjectOrder:
     """The order that a line gives; whether it can be obeyed is the laboratory's business.
 
     Raises:
-        ValueError: The line is no order; the message says why in one sentence.
+        ValueError: The line is no order; the message gives the reason in one sentence.
     """
-    said = _parse(line)
-    _check_keys(said, {"inject", "vehicle"}, {"parameters", "for_s"})
-    for_s = said.get("for_s")
+    reported = _parse(line)
+    _check_keys(reported, {"inject", "vehicle"}, {"parameters", "for_s"})
+    for_s = reported.get("for_s")
     return InjectOrder(
-        _text(said, "inject"),
-        _text(said, "vehicle"),
-        _parameters(said),
+        _text(reported, "inject"),
+        _text(reported, "vehicle"),
+        _parameters(reported),
         math.inf if for_s is None else _number("for_s", for_s),
     )
 
 
-def _line(said: dict[str, object]) -> bytes:
-    return (json.dumps(said, allow_nan=False, ensure_ascii=False) + "\n").encode()
+def _line(reported: dict[str, object]) -> bytes:
+    return (json.dumps(reported, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
 def _finite(value: float) -> float | None:
@@ -135,36 +138,36 @@ def _finite(value: float) -> float | None:
 
 def _parse(line: str | bytes) -> dict[str, Any]:
     try:
-        said = json.loads(line, parse_constant=_refuse_constant)
+        reported = json.loads(line, parse_constant=_refuse_constant)
     except RecursionError as error:
         raise ValueError("the line is nested too deeply") from error
     except ValueError as error:  # UnicodeDecodeError and JSONDecodeError among them
         raise ValueError(f"the line is no JSON: {error}") from error
-    if not isinstance(said, dict):
-        raise ValueError(f"the line is no JSON object but a {type(said).__name__}")
-    return said
+    if not isinstance(reported, dict):
+        raise ValueError(f"the line is no JSON object but a {type(reported).__name__}")
+    return reported
 
 
 def _refuse_constant(word: str) -> NoReturn:
     raise ValueError(f"{word} is not a number that JSON knows")
 
 
-def _check_keys(said: Mapping[str, object], needed: set[str], possible: set[str]) -> None:
-    for key in sorted(needed - said.keys()):
+def _check_keys(reported: Mapping[str, object], needed: set[str], possible: set[str]) -> None:
+    for key in sorted(needed - reported.keys()):
         raise ValueError(f"the line lacks the key {key!r}")
-    for key in sorted(said.keys() - needed - possible):
+    for key in sorted(reported.keys() - needed - possible):
         raise ValueError(f"the line has the unknown key {key!r}")
 
 
-def _text(said: Mapping[str, object], key: str) -> str:
-    value = said[key]
+def _text(reported: Mapping[str, object], key: str) -> str:
+    value = reported[key]
     if not isinstance(value, str):
         raise ValueError(f"{key} must be a text, got {value!r}")
     return value
 
 
-def _parameters(said: Mapping[str, object]) -> dict[str, float]:
-    given = said.get("parameters", {})
+def _parameters(reported: Mapping[str, object]) -> dict[str, float]:
+    given = reported.get("parameters", {})
     if not isinstance(given, dict):
         raise ValueError(f"parameters must be an object of numbers, got {given!r}")
     return {

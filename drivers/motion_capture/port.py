@@ -1,4 +1,4 @@
-"""A motion-capture system as poses with arrival stamps; which system, the rig's configuration says."""
+"""A motion-capture system as poses with arrival stamps; which system, the rig's configuration states."""
 
 import json
 import subprocess
@@ -41,7 +41,7 @@ class MotionCaptureCounters:
 
 
 class MotionCapturePort:
-    """Poses of rigid bodies, read by a process that holds the library (`reader` says why).
+    """Poses of rigid bodies, read by a process that holds the library (`reader` gives the reason).
 
     Args:
         config: `system`, one of `SYSTEMS`; `hostname`, for `optitrack` as a number like `192.168.1.10`; and
@@ -109,7 +109,7 @@ class MotionCapturePort:
                 if self._error is not None:
                     raise LinkLost(str(self._error)) from self._error
                 now_s = time.monotonic()
-                silent_at_s = self._heard_s + self._silence_s
+                silent_at_s = self._received_s + self._silence_s
                 if now_s >= silent_at_s:
                     raise LinkLost(f"motion capture {self.name} has sent no frame for {self._silence_s:g} s")
                 if now_s >= give_up_s:
@@ -167,7 +167,7 @@ class MotionCapturePort:
     def _wait_until_ready(self, connect_s: float) -> None:
         with self._news:
             self._news.wait_for(lambda: self._is_ready or self._error is not None, connect_s + _START_S)
-            self._heard_s = time.monotonic()
+            self._received_s = time.monotonic()
             is_ready, reason = self._is_ready, self._error
         if not is_ready:
             self.close()
@@ -195,7 +195,7 @@ class MotionCapturePort:
 
     def _take(self, message: Ready | Frame) -> None:
         with self._news:
-            self._heard_s = time.monotonic()
+            self._received_s = time.monotonic()
             if isinstance(message, Ready):
                 self._is_ready = True
             else:

@@ -38,15 +38,18 @@ class Frame:
 
 def encode(message: Ready | Failed | Frame) -> bytes:
     """The line of a message."""
-    said: dict[str, object]
+    reported: dict[str, object]
     match message:
         case Ready():
-            said = {"ready": True}
+            reported = {"ready": True}
         case Failed(reason):
-            said = {"error": reason}
+            reported = {"error": reason}
         case Frame(stamp_ns, bodies):
-            said = {"stamp_ns": stamp_ns, "bodies": {name: list(numbers) for name, numbers in bodies.items()}}
-    return (json.dumps(said) + "\n").encode()
+            reported = {
+                "stamp_ns": stamp_ns,
+                "bodies": {name: list(numbers) for name, numbers in bodies.items()},
+            }
+    return (json.dumps(reported) + "\n").encode()
 
 
 def decode(line: bytes) -> Ready | Failed | Frame:
@@ -55,8 +58,8 @@ def decode(line: bytes) -> Ready | Failed | Frame:
     Raises:
         ValueError: The line is none.
     """
-    said = json.loads(line)
-    match said:
+    reported = json.loads(line)
+    match reported:
         case {"ready": True}:
             return Ready()
         case {"error": str(reason)}:

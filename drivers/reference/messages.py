@@ -1,4 +1,4 @@
-"""A pose measured from outside, as the stream says it."""
+"""A pose measured from outside, as the stream gives it."""
 
 import math
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 V4L2 stamps each buffer by the kernel's monotonic clock; servers such as mjpg-streamer and µStreamer put a
 stamp into the part's header `X-Timestamp`, seconds of the monotonic or of the UTC clock of their host. Which
-one is not said, so a stamp counts only if it lies shortly before the arrival.
+one is not reported, so a stamp counts only if it lies shortly before the arrival.
 """
 
 import math
@@ -17,7 +17,7 @@ def device_stamp_ns(stamp_s: float, arrival_ns: int, offset_utc_ns: int) -> int 
     """The driver's stamp on the host's monotonic clock.
 
     Args:
-        stamp_s: What the driver said, seconds of the monotonic or the UTC clock.
+        stamp_s: What the driver reported, seconds of the monotonic or the UTC clock.
         arrival_ns: When the last byte had been read, monotonic clock.
         offset_utc_ns: The host's UTC minus its monotonic clock.
 

@@ -45,7 +45,7 @@ class StarCamera:
         self._news = threading.Condition()
         self._newest: CameraFrame | None = None
         self._error: LinkLost | None = None
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         self._received = 0
         self._read = 0
         self._is_closed = False
@@ -98,7 +98,7 @@ class StarCamera:
                 if self._error is not None:
                     raise LinkLost(str(self._error)) from self._error
                 now_s = time.monotonic()
-                silent_at_s = self._heard_s + self._silence_s
+                silent_at_s = self._received_s + self._silence_s
                 if now_s >= silent_at_s:
                     raise LinkLost(f"star camera {self.name} has sent no picture for {self._silence_s:g} s")
                 if give_up_s is not None and now_s >= give_up_s:
@@ -147,13 +147,13 @@ class StarCamera:
                         picture.image, picture.stamp_arrival_ns, number, picture.stamp_device_ns
                     )
                     self._received += 1
-                    self._heard_s = time.monotonic()
+                    self._received_s = time.monotonic()
                     self._news.notify_all()
         except LinkLost as lost:
             error = lost
         except DeviceError as failed:
             error = LinkLost(str(failed))
-        finally:  # whatever ended the thread, the reader must hear of it
+        finally:  # whatever ended the thread, the reader must learn of it
             with self._news:
                 self._error = self._error or error
                 self._news.notify_all()

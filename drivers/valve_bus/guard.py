@@ -37,7 +37,7 @@ class Guard:
         self._stop_reason: StopReason | None = None
         self._last_stamp_ns: int | None = None
         self._offset_ns = 0  # from stamps to the guard's own time, which never goes back
-        self._heard_ns: int | None = None  # last command in sequence, the first after silence included
+        self._received_ns: int | None = None  # last command in sequence, the first after silence included
         self._is_in_sequence = False
         self._last_counter: int | None = None
         self._last_pulse_id = 0
@@ -67,7 +67,7 @@ class Guard:
         if self._stop_reason is not None:
             return False
         self._is_armed = True
-        self._pending = None  # asked for before anybody said that valves may open
+        self._pending = None  # asked for before anybody reported that valves may open
         self._announcement = Arm(self.vehicle, is_armed=True)
         return True
 
@@ -138,7 +138,7 @@ class Guard:
         if self._last_stamp_ns is not None and stamp_ns < self._last_stamp_ns:
             self._counters.clock_went_back += 1
             self._offset_ns += self._last_stamp_ns - stamp_ns
-            self._heard_ns = None
+            self._received_ns = None
             self._latch_stop(StopReason.GUARD)
         self._last_stamp_ns = stamp_ns
         return stamp_ns + self._offset_ns
@@ -155,7 +155,7 @@ class Guard:
         if not was_silent and step > COUNTER_MODULUS // 2:
             return Verdict.COUNTER_BACKWARDS
         is_new_pulse = command.pulse_id != self._last_pulse_id
-        self._heard_ns = now_ns
+        self._received_ns = now_ns
         self._last_counter = command.counter
         self._last_pulse_id = command.pulse_id
         self._is_in_sequence = not was_silent
@@ -165,7 +165,7 @@ class Guard:
         return Verdict.NEW_PULSE if is_new_pulse else Verdict.REFRESHED
 
     def _is_silent(self, now_ns: int) -> bool:
-        return self._heard_ns is None or now_ns - self._heard_ns >= _SILENCE_NS
+        return self._received_ns is None or now_ns - self._received_ns >= _SILENCE_NS
 
     def _gate(self, now_ns: int) -> Gate:
         if self._stop_reason is not None:
@@ -181,7 +181,7 @@ class Guard:
             self._counters.stops += 1
             self._stop_reason = reason
         self._is_armed = False
-        self._announcement = None  # the stop frame says more
+        self._announcement = None  # the stop frame states more
 
     def _start_pulse(self, now_ns: int, on_times_ms: tuple[int, ...]) -> None:
         self._sent_pulse_id = (self._sent_pulse_id + 1) % COUNTER_MODULUS

@@ -1,4 +1,4 @@
-"""What the guard says about itself: verdicts, the state of the gate, counters, what it sends."""
+"""What the guard states about itself: verdicts, the state of the gate, counters, what it sends."""
 
 from dataclasses import dataclass
 from enum import StrEnum

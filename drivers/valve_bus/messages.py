@@ -1,4 +1,4 @@
-"""What is said on the valve bus, as values; how it is packed is the business of `protocol`."""
+"""What is sent on the valve bus, as values; how it is packed is the business of `protocol`."""
 
 import math
 from dataclasses import dataclass, field

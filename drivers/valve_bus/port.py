@@ -1,4 +1,4 @@
-"""A CAN adapter as frames with arrival stamps; which adapter, the rig's configuration says."""
+"""A CAN adapter as frames with arrival stamps; which adapter, the rig's configuration states."""
 
 import os
 import socket

@@ -24,7 +24,7 @@ class CameraConfig(Settings):
     missing_fraction: Fraction = 0.0
     """Of the exposures, how many give no drawn fix."""
     wrong_fraction: Fraction = 0.0
-    """Of the drawn fixes, how many are wrong by more than their sigma says, unmarked."""
+    """Of the drawn fixes, how many are wrong by more than their sigma states, unmarked."""
     stream: Literal["raw", "mjpeg"] = "raw"
     """How live pictures are served over HTTP."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90

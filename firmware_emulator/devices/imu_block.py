@@ -56,7 +56,7 @@ class ImuBlock:
         grid: The crystal's polls, the same that the vehicle was given; starts `GYRO_START_NS` after power-up.
         sensors: Gyro and inclinometers.
         line: To the host.
-        frame_version: 1 or 2. A version 1 block hears no commands.
+        frame_version: 1 or 2. A version 1 block receives no commands.
         averaging: Polls per frame.
         serial_number: For identify.
         warm_up: Its temperature.

@@ -1,6 +1,6 @@
 """A motion-capture system around the table: what its cameras make of every mock-up, frame by frame.
 
-Poses come in the system's own frame, which lies otherwise than the table's as the scenario says; they are
+Poses come in the system's own frame, which lies otherwise than the table's as the scenario states; they are
 noisy, late, and missing while something stands between. In lockstep they are what the driver makes of them
 (`drivers.motion_capture.pose`), live they go out as the wire's bytes (`firmware_emulator.live.natnet`).
 """

@@ -1,7 +1,7 @@
 """Poses on a wire: the truth as a motion-capture system would send it, and fixes drawn from truth plus noise.
 
 Both speak the reference stream (`docs/interfaces/reference_stream.md`). The truth is stamped exactly; a
-drawn fix says the delay that the rig believes in, while the real one scatters.
+drawn fix states the delay that the rig believes in, while the real one scatters.
 """
 
 import math
@@ -79,10 +79,10 @@ class FixErrors:
     """How drawn fixes differ from the truth.
 
     Attributes:
-        sigma_xy_m: Standard deviation per axis, also what the fix says of itself.
+        sigma_xy_m: Standard deviation per axis, also what the fix states of itself.
         sigma_heading_rad: Likewise.
         missing_fraction: Of the pictures, how many give no fix.
-        wrong_fraction: Of the fixes, how many are wrong and do not say so: half anywhere on the table,
+        wrong_fraction: Of the fixes, how many are wrong and do not state it so: half anywhere on the table,
             half by some centimetres.
         bounds_m: Where the wildly wrong ones fall: x_min, x_max, y_min, y_max.
     """
@@ -101,7 +101,7 @@ class FixStream:
         index: Vehicle's index.
         vehicle: Whose motion.
         rate_hz: Exposures per second.
-        delay_s: From an exposure to its fix at the host, as the fix says.
+        delay_s: From an exposure to its fix at the host, as the fix states.
         delay_jitter_s: Standard deviation of the real delay.
         errors: What is wrong with the fixes.
         failures: Camera failures: `dead_sky`, `silent_camera`, `frozen_camera`, `false_lights`.

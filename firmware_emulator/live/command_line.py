@@ -26,7 +26,7 @@ class _Ended(BaseException):
 
 
 class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters
-    """The rig file cannot be used; the message says why in one sentence."""
+    """The rig file cannot be used; the message gives the reason in one sentence."""
 
 
 def read_laboratory(path: Path) -> dict[str, object]:

@@ -22,7 +22,7 @@ _LONGEST_WAIT_S = 0.25  # a signal that comes just before the wait is noticed af
 
 
 class LiveLaboratory:
-    """The laboratory on ports: each channel is served as its device's kind says, pictures by one process.
+    """The laboratory on ports: each channel is served as its device's kind states, pictures by one process.
 
     Laboratory time is the host's monotonic clock. One thread does everything but draw.
 
@@ -56,7 +56,7 @@ class LiveLaboratory:
             raise
 
     def announcement(self) -> str:
-        """The line that says where the channels are."""
+        """The line that states where the channels are."""
         return encode_announcement(self.addresses)
 
     def stop(self) -> None:

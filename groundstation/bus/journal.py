@@ -43,7 +43,7 @@ class Kind(IntEnum):
     OUTPUT = 3  # the node published (noun, owner, sequence)
     DROP = 4  # (noun, owner, sequence) was replaced by a newer one before the node took it
     PORT = 5  # a port of the process turned something outside into (noun, owner, sequence)
-    STOP = 6  # the node was told that its process ends
+    STOP = 6  # the node was given that its process ends
 
 
 ENTRY = np.dtype(

@@ -180,12 +180,12 @@ class ZenohBus:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""
         self._token = self._session.liveliness().declare_token(f"{ALIVE}/{process}")
 
-    def watch(self, told: Callable[[str, bool], None]) -> None:
+    def watch(self, given: Callable[[str, bool], None]) -> None:
         """Be told of every process that becomes ready or goes; runs on Zenoh's thread."""
 
         def take(sample: zenoh.Sample) -> None:
             process = str(sample.key_expr).rpartition("/")[2]
-            told(process, sample.kind == zenoh.SampleKind.PUT)
+            given(process, sample.kind == zenoh.SampleKind.PUT)
 
         callback = Callback(take, indirect=self._is_hub)
         self._subscribers.append(

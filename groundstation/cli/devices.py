@@ -88,7 +88,7 @@ def _as_dict(report: PortReport, owners: dict[int, str]) -> dict[str, Any]:
         "serial_number": who.serial_number if who else None,
         "firmware": f"{who.firmware_major}.{who.firmware_minor}" if who else None,
         "sample_count": who.sample_count if who else None,
-        "frames_heard": report.frames_heard,
+        "frames_heard": report.frames_received,
         "says": report.sentence,
         "counters": {name: count for name, count in report.counters.as_dict().items() if count},
     }

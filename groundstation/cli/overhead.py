@@ -41,7 +41,7 @@ def overhead(
     """Find mock-ups in pictures taken from above.
 
     Each picture is looked at on its own.
-    mock_ups.toml says which coloured circles each mock-up wears, camera.json is that of the camera over the
+    mock_ups.toml states which coloured circles each mock-up wears, camera.json is that of the camera over the
     table; ms is the CPU time of the whole picture.
 
     Example: groundstation star-tracker overhead recordings/table --out answers.csv

@@ -76,7 +76,7 @@ def causes(
             raise UsageError(f"no topic is called {topic!r}; `groundstation recording info` lists them")
         index = CauseIndex(found)
     wanted = Cause(topic, vehicle, sequence)
-    told_ns = index[wanted].told_ns
+    given_ns = index[wanted].given_ns
     table = Table(box=None, pad_edge=False)
     for heading, width in (("back", 4), ("message", 24), ("number", 6), ("made by", 21)):
         table.add_column(heading, no_wrap=True, min_width=width)
@@ -85,7 +85,7 @@ def causes(
     for steps, origin in index.chain(wanted):
         reference = origin.message
         name = f"{reference.owner}/{reference.noun}".removeprefix("/")
-        age_ms, took_ms = (told_ns - origin.told_ns) * 1e-6, origin.wall_ns * 1e-6
+        age_ms, took_ms = (given_ns - origin.given_ns) * 1e-6, origin.wall_ns * 1e-6
         made_by = origin.node or "a port"
         table.add_row(
             str(steps),
@@ -105,19 +105,21 @@ def _recovered_name(file: Path) -> Path:
 
 def _print_info(found: Recording) -> None:
     span_s = (found.stop_ns - found.start_ns) * 1e-9
-    said = found.info
+    reported = found.info
     count = sum(channel.count for channel in found.channels)
     size_mb = found.path.stat().st_size / 1e6
     print(f"{found.path}: {span_s:.1f} s, {count} messages, {size_mb:.2f} MB")
-    print(f"rig: {_rig_name(said)}; images: {said.images.value}; by: {said.software or 'unknown'}")
-    if said.utc_offset_ns is None:
-        print("clock: virtual" + ("" if said.seed is None else f"; seed: {said.seed}"))
+    print(
+        f"rig: {_rig_name(reported)}; images: {reported.images.value}; by: {reported.software or 'unknown'}"
+    )
+    if reported.utc_offset_ns is None:
+        print("clock: virtual" + ("" if reported.seed is None else f"; seed: {reported.seed}"))
     else:
         start = datetime.fromtimestamp(0, UTC) + timedelta(
-            microseconds=(found.start_ns + said.utc_offset_ns) // 1000
+            microseconds=(found.start_ns + reported.utc_offset_ns) // 1000
         )
         print(f"start: {start:%Y-%m-%d %H:%M:%S} UTC")
-    for name, digest in said.calibration_sha256.items():
+    for name, digest in reported.calibration_sha256.items():
         print(f"calibration {name}: sha256 {digest[:16]}…")
     table = Table("topic", "of", "messages", "rate / Hz", box=None, pad_edge=False)
     for channel in found.channels:
@@ -126,8 +128,8 @@ def _print_info(found: Recording) -> None:
     Console().print(table)
 
 
-def _rig_name(said: RecordingInfo) -> str:
+def _rig_name(reported: RecordingInfo) -> str:
     try:
-        return str(tomllib.loads(said.rig_toml).get("name", said.rig_path or "unnamed"))
+        return str(tomllib.loads(reported.rig_toml).get("name", reported.rig_path or "unnamed"))
     except tomllib.TOMLDecodeError:
         return "unreadable"

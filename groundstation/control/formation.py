@@ -1,6 +1,6 @@
 """Formation: hold a pose relative to other mock-ups.
 
-Each neighbour says where this mock-up should be: at a fixed offset, either along the table's axes or carried
+Each neighbour fixes where this mock-up should be: at a fixed offset, either along the table's axes or carried
 by the neighbour's own heading. The setpoint is the weighted mean of these and of the own goal; with one
 neighbour and no goal weight this is leader and follower, with mutual neighbours it is the consensus law for
 relative states with a leader (W. Ren, R. Beard, Distributed Consensus in Multi-vehicle Cooperative Control,
@@ -87,7 +87,7 @@ class Formation:
         state = state.bounded()
         setpoint = self._setpoint(goal.bounded(), neighbours)
         if setpoint is None:
-            # never heard of anybody: stay where we are
+            # never received of anybody: stay where we are
             setpoint = self._held or Goal(state.position_table_m, state.heading_rad)
             setpoint = replace(setpoint, velocity_table_m_s=(0.0, 0.0), rate_rad_s=0.0)
         self._held = setpoint

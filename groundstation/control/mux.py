@@ -93,7 +93,7 @@ class CommandMux(Generic[Demand]):
         """Take a demand of the controller."""
         self._offer(Source.CONTROLLER, demand, arrival_ns)
 
-    def hear_state(self, arrival_ns: int) -> None:
+    def receive_state(self, arrival_ns: int) -> None:
         """Note that a state estimate arrived."""
         self._state_arrival_ns = arrival_ns
 

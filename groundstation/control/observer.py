@@ -3,7 +3,7 @@
 Knowing the own push, the observer may average the measured velocity over a second without lagging behind
 manoeuvres. What remains unexplained is a disturbance: the slope of the table (3 mm/s^2 for 0.3 mrad), a hose,
 a valve that pushes off-centre. It integrates the same innovation, so it takes the place of an integral term;
-because it is told the wrench that was really delivered, saturation and closed valves do not wind it up.
+because it is given the wrench that was really delivered, saturation and closed valves do not wind it up.
 Both poles of the observer are equal (G. Franklin, J. Powell, M. Workman, Digital Control of Dynamic Systems,
 3rd ed. 1998, section 8.2; the disturbance state in 8.5.2).
 """

@@ -12,7 +12,7 @@ LENGTH_BOUND_M = 1e6  # far beyond any table: keeps sums finite whatever comes i
 SPEED_BOUND = 1e3  # m/s, rad/s and their derivatives: nothing on a table is faster
 
 Vector2 = tuple[float, float]
-"""Two components along x and y of the frame that the name says."""
+"""Two components along x and y of the frame that the name states."""
 
 
 def rotate(vector: Vector2, angle_rad: float) -> Vector2:

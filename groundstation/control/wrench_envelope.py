@@ -18,7 +18,7 @@ _ABSURD = 1e9  # N or N m: products of larger demands could overflow
 
 
 class WrenchEnvelope:
-    """Says whether a wrench can be made, and shortens one that cannot.
+    """States whether a wrench can be made, and shortens one that cannot.
 
     Raises:
         ValueError: The valves cannot push in every direction and turn both ways.

@@ -27,7 +27,7 @@ _ZIG = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
 
 
 class CoreBuildError(RuntimeError):
-    """The core could not be compiled; the text says why in one sentence."""
+    """The core could not be compiled; the text gives the reason in one sentence."""
 
 
 def compiler() -> tuple[str, ...]:

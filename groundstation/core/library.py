@@ -10,7 +10,7 @@ from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, sources
 
 
 class CoreError(RuntimeError):
-    """There is no core that can be used; the text says why and what to do."""
+    """There is no core that can be used; the text gives the reason and what to do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """What a node is: a pure transformer with state, and its row in a part.
 
-It names its input and output topics, is told the time, and returns messages. Three runners execute the
+It names its input and output topics, is given the time, and returns messages. Three runners execute the
 same object: live, lockstep and replay. ``now_ns`` is the moment at which the runner delivers a message (its
 arrival); runners write it into the journal, so that a replay tells the same moments.
 """
@@ -42,7 +42,7 @@ class Node(ABC):
         self.tick_period_ns = tick_period_ns
 
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
-        """Vehicles whose ``payload`` topic this node receives; its own unless a node says otherwise."""
+        """Vehicles whose ``payload`` topic this node receives; its own unless a node states otherwise."""
         del payload
         return (self.vehicle,)
 
@@ -90,7 +90,7 @@ class NodeRow:
 
     Attributes:
         name: As in rig files, journals and health.
-        process: Default process, or what says it; ``{vehicle}`` is filled in.
+        process: Default process, or what gives it; ``{vehicle}`` is filled in.
         weight: What it may share a process with.
         kind: Its class, or ``module:Class`` where the module is imported only by the process that runs it.
         make: Builds it from the rig for a vehicle.

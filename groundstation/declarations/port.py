@@ -53,7 +53,7 @@ class Port(ABC):
     Attributes:
         channel: Name of the channel, as laboratories announce it: ``alpha/imu``, ``valve_bus``.
         vehicle: Whose it is, empty for what all vehicles share.
-        address: Where the rig says it is opened.
+        address: Where the rig gives it is opened.
         reads: Class of the payloads that come in here.
         delivery: Whether a slow process sees every item or only the newest.
         is_optional: A laboratory without that channel is no mistake.

@@ -123,7 +123,7 @@ class RecordSection(Section):
 
 
 class NodeSection(Section):
-    """What the rig says about one node: its process, and the time it takes (emulated conditions).
+    """What the rig states about one node: its process, and the time it takes (emulated conditions).
 
     ``busy_s``: takes one message at a time and answers after this long. ``late_s``: answers late, but
     takes every message.

@@ -33,7 +33,7 @@ class RigFile:
         self._values: dict[object, Any] = {}
 
     def value(self, parse: Callable[[bytes, Path], T]) -> T:
-        """What the file says, parsed at the first call from the bytes that were hashed."""
+        """What the file states, parsed at the first call from the bytes that were hashed."""
         if parse not in self._values:
             self._values[parse] = parse(self.data, self.path)
         found: T = self._values[parse]

@@ -2,4 +2,4 @@
 
 
 class FileError(ValueError):
-    """A file is missing, torn or says something impossible; the message is one sentence naming it."""
+    """A file is missing, torn or states something impossible; the message is one sentence naming it."""

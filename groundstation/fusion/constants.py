@@ -29,11 +29,11 @@ CONSTANTS: Mapping[str, tuple[int, str]] = {
 """Name: error state and unit. Biases are those at the end of the recording and at its first temperature."""
 
 OF_THE_DAY = frozenset({"gyro_bias", "acc_bias_x", "acc_bias_y", "slope_x", "slope_y"})
-"""What no calibration can promise for the next run: it is found anew at rest, or the table's map says it."""
+"""What no calibration can promise for the next run: it is found anew at rest, or the table's map gives it."""
 
 
 def noise_with_constants(noise: NoiseModel, found: Mapping[str, tuple[float, float]]) -> NoiseModel:
-    """Return the model with what calibrations found, weighed against what it said itself.
+    """Return the model with what calibrations found, weighed against what it reported itself.
 
     Args:
         noise: of the rig.

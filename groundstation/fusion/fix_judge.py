@@ -154,7 +154,7 @@ class FixJudge:
         self._creep = copy.copy(last.creep)
 
     def _contradicted(self, fix: Fix, t: float, z: Array, nis: float) -> FixOutcome:
-        """Refuse a fix, or believe it when those before it said the same."""
+        """Refuse a fix, or believe it when those before it reported the same."""
         self._counters.add("fix_outside_the_gate")
         self._refused.append((t, z))
         if len(self._refused) >= self._noise.reopen_after:

@@ -12,8 +12,8 @@ MAX_PLAUSIBLE = 1e3
 
 def complaint_about(fix: Fix) -> str | None:
     """Return why a fix is refused unseen, or None."""
-    said = (fix.x_m, fix.y_m, fix.heading_rad, *fix.covariance.ravel().tolist())
-    if not all(map(math.isfinite, said)):
+    reported = (fix.x_m, fix.y_m, fix.heading_rad, *fix.covariance.ravel().tolist())
+    if not all(map(math.isfinite, reported)):
         return "not finite"
     if max(abs(fix.x_m), abs(fix.y_m), abs(fix.heading_rad)) > MAX_PLAUSIBLE:
         return "not on any table"

@@ -1,4 +1,4 @@
-"""What a fusion estimator must be told about the sensors, the table and their errors."""
+"""What a fusion estimator must be given about the sensors, the table and their errors."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ class Reckoner:
 
     @property
     def is_lost(self) -> bool:
-        """What the report says."""
+        """What the report states."""
         return bool(self.now.state.is_lost)
 
     @is_lost.setter

@@ -11,7 +11,7 @@ from typing import IO, Protocol
 
 FIRST_BACK_OFF_S, LAST_BACK_OFF_S, PROVEN_S = 0.25, 8.0, 20.0
 REFUSAL = 2
-"""Exit code of a child that cannot do what it is ordered; its last line on stderr says why."""
+"""Exit code of a child that cannot do what it is ordered; its last line on stderr gives the reason."""
 
 _READ_BYTES, _MOST_READS = 1 << 16, 16
 

@@ -48,7 +48,7 @@ class Launcher:
 
     Args:
         rig: The rig.
-        rig_text: What its file said when the rig was read; holds, as do the files that it names, for the
+        rig_text: What its file reported when the rig was read; holds, as do the files that it names, for the
             whole run.
         rig_path: The file.
         recording: Where the recorder writes; None for no recording.
@@ -107,7 +107,7 @@ class Launcher:
         """Names of the processes that are not ready."""
         return [child.name for child in self.children if not child.is_ready]
 
-    def heard(self, name: str) -> None:
+    def received(self, name: str) -> None:
         """Note a sign of life of a process: a batch of its record stream; called from the bus's thread."""
         child = self._children.get(name)
         if child is not None:
@@ -117,7 +117,7 @@ class Launcher:
         """Look after the children once; call a few times a second.
 
         Raises:
-            RigError: A child refuses what the rig says.
+            RigError: A child refuses what the rig states.
             GroundStationError: The laboratory cannot be started.
         """
         while not self._tidings.empty():

@@ -27,7 +27,7 @@ class LiveRun:
 
     Args:
         rig: The rig.
-        rig_text: What its file said when the rig was read.
+        rig_text: What its file reported when the rig was read.
         rig_path: The file.
         recording: Where the recorder writes.
     """
@@ -81,7 +81,7 @@ class LiveRun:
     def _receive(self, key: str, batch: bytes, _attachment: bytes) -> None:
         """A batch of a process, on Zenoh's thread."""
         process = split_key(key)[1]
-        self.launcher.heard(process)
+        self.launcher.received(process)
         self._batches.put((process, batch))
 
     def _take(self, until_s: float) -> None:

@@ -16,7 +16,7 @@ class Orders:
     Attributes:
         process: Its name in the plan.
         rig_path: Of the rig file.
-        rig_text: What the file said when the run began.
+        rig_text: What the file reported when the run began.
         files: Every file that the rig names, by absolute path, as it was when the run began: what flew is
             what was hashed.
         endpoint: Of the hub.

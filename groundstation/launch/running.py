@@ -52,8 +52,10 @@ def find_running() -> list[RunningRig]:
     found = []
     for path in sorted(_folder().glob("*.json")):
         try:
-            said = json.loads(path.read_text())
-            run = RunningRig(said["pid"], said["rig"], said["endpoint"], tuple(said["vehicles"]))
+            reported = json.loads(path.read_text())
+            run = RunningRig(
+                reported["pid"], reported["rig"], reported["endpoint"], tuple(reported["vehicles"])
+            )
         except (OSError, ValueError, KeyError, TypeError):
             continue  # being removed just now, or not ours
         if _lives(run.pid):

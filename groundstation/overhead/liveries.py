@@ -49,7 +49,7 @@ class Livery:
         radius_m: Of each circle.
 
     Raises:
-        ValueError: The circles cannot give a pose; the message says why.
+        ValueError: The circles cannot give a pose; the message gives the reason.
     """
 
     vehicle: str

@@ -21,14 +21,14 @@ class Origin:
     Attributes:
         message: The message.
         node: Key of the node that published it, empty for a port.
-        told_ns: When the node was told what made it publish.
+        given_ns: When the node was given what made it publish.
         wall_ns: Wall time of that call, 0 in lockstep.
         causes: The trigger first, then the newest of the node's other inputs.
     """
 
     message: Cause
     node: str
-    told_ns: int
+    given_ns: int
     wall_ns: int
     causes: tuple[Cause, ...]
 

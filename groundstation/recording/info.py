@@ -1,4 +1,4 @@
-"""What a recording says about itself: the rig, the calibrations, the seed, the clock.
+"""What a recording states about itself: the rig, the calibrations, the seed, the clock.
 
 It travels as one MCAP metadata record, written first, so that even a torn file can be replayed.
 """
@@ -57,34 +57,34 @@ class RecordingInfo:
         return out
 
     @classmethod
-    def from_metadata(cls, said: Mapping[str, str]) -> "RecordingInfo":
+    def from_metadata(cls, reported: Mapping[str, str]) -> "RecordingInfo":
         """Read a metadata record back; keys that are not there get their defaults.
 
         Raises:
             RecordingError: A number or the image policy cannot be read.
         """
         try:
-            version = int(said.get("format", "1"))
+            version = int(reported.get("format", "1"))
         except ValueError as error:
             raise RecordingError(f"metadata record {METADATA_NAME!r}: {error}") from error
         if version != FORMAT:
             raise RecordingError(
                 f"it is of recording format {version}, this program reads format {FORMAT}: "
-                f"use the version that recorded it ({said.get('software', '') or 'unknown'})"
+                f"use the version that recorded it ({reported.get('software', '') or 'unknown'})"
             )
         try:
             return cls(
-                rig_toml=said.get("rig", ""),
-                rig_path=said.get("rig_path", ""),
-                images=ImagePolicy(said.get("images", ImagePolicy.SPOTS)),
+                rig_toml=reported.get("rig", ""),
+                rig_path=reported.get("rig_path", ""),
+                images=ImagePolicy(reported.get("images", ImagePolicy.SPOTS)),
                 calibration_sha256={
                     key.removeprefix(_CALIBRATION): value
-                    for key, value in said.items()
+                    for key, value in reported.items()
                     if key.startswith(_CALIBRATION)
                 },
-                seed=_optional_int(said.get("seed")),
-                software=said.get("software", ""),
-                utc_offset_ns=_optional_int(said.get("utc_offset_ns")),
+                seed=_optional_int(reported.get("seed")),
+                software=reported.get("software", ""),
+                utc_offset_ns=_optional_int(reported.get("utc_offset_ns")),
             )
         except ValueError as error:
             raise RecordingError(f"metadata record {METADATA_NAME!r}: {error}") from error

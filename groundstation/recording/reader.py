@@ -1,6 +1,6 @@
 """Reads a finished recording lazily, in the order of its log times.
 
-The index at the end of the file says which chunks hold which channels; chunks are unpacked one at a
+The index at the end of the file states which chunks hold which channels; chunks are unpacked one at a
 time, so that a recording of any length is read in little memory.
 """
 
@@ -81,7 +81,7 @@ class Recording:
         path: An ``.mcap`` file.
 
     Attributes:
-        info: What the recording says about itself.
+        info: What the recording states about itself.
         channels: By noun, then by owner.
         start_ns: First log time, 0 if empty.
         stop_ns: Last log time, 0 if empty.

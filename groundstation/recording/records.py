@@ -92,7 +92,7 @@ class Chunk:
         """As much of the records inside as the data at hand gives; compressors work in blocks.
 
         Raises:
-            DamagedChunkError: The data is not what the chunk says it is.
+            DamagedChunkError: The data is not what the chunk gives it is.
         """
         try:
             if self.compression == "zstd":

@@ -38,7 +38,7 @@ class Recorder:
 
     Args:
         path: The finished file, e.g. ``run.mcap``; until then it is ``run.mcap.part``.
-        info: What the recording says about itself.
+        info: What the recording states about itself.
         flush_period_ns: At most this much of log time is lost when the recorder is killed.
         durable: Also force each flush through to the disk, against loss of power.
 

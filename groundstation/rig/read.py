@@ -203,7 +203,7 @@ def _check_vehicles(rig: Rig) -> None:
 def _first_sentence(error: ValidationError) -> str:
     found = error.errors()
     typos = [each for each in found if each["type"] == "extra_forbidden"]
-    first = (typos or found)[0]  # a typo in a required key is also a missing key: the typo says more
+    first = (typos or found)[0]  # a typo in a required key is also a missing key: the typo states more
     where = ".".join(str(part) for part in first["loc"] if part != "[key]")
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":

@@ -129,10 +129,10 @@ class LiveProcess:
             self._release(now_ns)
             for tick in ticks:
                 if tick.due_ns <= now_ns:
-                    told_ns = time.monotonic_ns()  # a node is never told an earlier moment than before
-                    self._step.tick(tick.slot, told_ns)
+                    given_ns = time.monotonic_ns()  # a node is never told an earlier moment than before
+                    self._step.tick(tick.slot, given_ns)
                     self._drain()
-                    tick.advance(told_ns)
+                    tick.advance(given_ns)
                     if self._is_done():
                         self.stop()
             if now_ns >= next_journal_ns:

@@ -1,6 +1,6 @@
 """The replay runner: the recording's stamps are the clock, its journal is the order of things.
 
-Each chosen node is built anew and told exactly what it was told then: started, handed the recorded
+Each chosen node is built anew and told exactly what it was given then: started, handed the recorded
 inputs at the recorded moments, ticked, stopped. What it publishes is compared with what was recorded. One
 pass over the file in log order; memory holds what lies between a message and its journal entry.
 """
@@ -100,13 +100,13 @@ class ReplayRunner:
         Args:
             progress: Told the log time now and then.
         """
-        told_ns = 0
+        given_ns = 0
         while self._pull():
             while self._backlog:
                 self._follow(self._backlog.popleft())
-            if progress is not None and self._log_ns >= told_ns:
+            if progress is not None and self._log_ns >= given_ns:
                 progress(self._log_ns)
-                told_ns = self._log_ns + 1_000_000_000
+                given_ns = self._log_ns + 1_000_000_000
         for node in self._replayed_nodes.values():
             self._leave(node)
         self._report.results = self._comparison.finish()
@@ -176,15 +176,15 @@ class ReplayRunner:
         node.receive(found, now_ns)
 
     def _expect(self, node: ReplayedNode, noun: str, owner: str, sequence: int) -> None:
-        """The journal says that the node published this next."""
+        """The journal states that the node published this next."""
         if node.published:
-            payload, told_ns = node.published.popleft()
-            self._comparison.replayed(noun, owner, sequence, payload, told_ns)
+            payload, given_ns = node.published.popleft()
+            self._comparison.replayed(noun, owner, sequence, payload, given_ns)
         else:
             self._comparison.missing(noun, owner)
 
     def _leave(self, node: ReplayedNode) -> None:
         """The node goes on to its next call: whatever of the last is not in the journal is new."""
         while node.published:
-            payload, told_ns = node.published.popleft()
-            self._comparison.extra(node.owner_of(payload), payload, told_ns)
+            payload, given_ns = node.published.popleft()
+            self._comparison.extra(node.owner_of(payload), payload, given_ns)

@@ -1,4 +1,4 @@
-"""What can be said of one picture for people: which light is what, and where stars should be.
+"""What can be reported of one picture for people: which light is what, and where stars should be.
 
 A refused picture is worth little without the question why. These notes put a name to every light and
 a place to every star, by the pose of the fix, else by the pose that the refused search came nearest

@@ -1,12 +1,12 @@
 """A watchdog of the sky: which stars died, moved or came back, and which lights are new.
 
-Every fix says which stars should be in the picture and which were seen. A star's sightings are a coin
+Every fix states which stars should be in the picture and which were seen. A star's sightings are a coin
 with two sides, alive (seen with probability ``p_seen``) or dead (``p_false``); the log-likelihood ratio
 of the two is summed with a forgetting factor and crosses a threshold either way (Wald's sequential
 test). A star that is seen off its place again and again, always at the same other place, has moved.
 Lights that are no stars are followed by ``stray_lights``.
 
-What is dead or has moved is told by ``dropped``; both may come back. A fix of few stars teaches nothing.
+What is dead or has moved is given by ``dropped``; both may come back. A fix of few stars teaches nothing.
 """
 
 import math
@@ -187,8 +187,8 @@ class SkyWatch:
                 self._elsewhere[row] = Place(complex(at))
                 continue
             place.add(complex(at))
-            told = self._moved.get(row)
-            is_news = told is None or abs(place.mean - told) > gate
+            given = self._moved.get(row)
+            is_news = given is None or abs(place.mean - given) > gate
             if is_news and place.sightings >= settings.moved_sightings:
                 self._moved[row] = place.mean
                 name, covariance = self._catalogue.ids[row], place.covariance_m2(self._systematic_m2())

@@ -25,7 +25,7 @@ class StarCatalogue:
         ids: Names of the stars as written in the file.
         x_m: Positions, shape (n,), m.
         y_m: Positions, shape (n,), m.
-        sigma_m: Standard deviation per axis, shape (n,), m; 0 where the file does not say.
+        sigma_m: Standard deviation per axis, shape (n,), m; 0 where the file does not state it.
     """
 
     ids: tuple[str, ...]

@@ -3,7 +3,7 @@
 A light that comes back at one place is followed. Its sightings and misses are summed as a log
 likelihood ratio, "hangs there" against "was there by chance" (Wald's sequential test); after enough
 sightings it is proposed, and proposed again each time that they have doubled, because its place is
-better known then. A proposed light that is gone is said to have vanished.
+better known then. A proposed light that is gone is reported to have vanished.
 """
 
 import math

@@ -154,7 +154,7 @@ class Ledger:
         return Latency(stamp_ns, vehicle, STAGES, tuple(p50_s), tuple(p99_s))
 
     def _read(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...], payload: Message) -> None:
-        """A message that says something of an origin."""
+        """A message that states something of an origin."""
         if isinstance(payload, ImuBytes):
             self._learn(key, payload.stamp_ns)
         elif isinstance(payload, StarSpots):  # its fix will name the exposure

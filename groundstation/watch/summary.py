@@ -12,7 +12,7 @@ from groundstation.watch.tracks import DRAWN, Track, TrackBuilder
 
 
 class VehicleReport(NamedTuple):
-    """What a recording says of one vehicle: arrays for figures, and numbers for ``report.json``."""
+    """What a recording states of one vehicle: arrays for figures, and numbers for ``report.json``."""
 
     track: Track
     numbers: dict[str, Any]

@@ -73,9 +73,10 @@ def test_a_tilt_chip_that_dies_is_named_and_the_vehicle_flies_on_without_it(fly,
     flight = fly(fault("dead_tilt", axis=axis)).run(STOP_S)
     dead = flight.of(Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
     assert all(f"tilt_{name}" in imu.reason and not imu.valid and imu.usable == usable for imu in dead)
-    said = {row.summary for row in flight.published[Diagnostics] if row.node == "alpha/fusion"}
+    reported = {row.summary for row in flight.published[Diagnostics] if row.node == "alpha/fusion"}
     assert (
-        f"alpha/fusion: accelerometer {name} not believed: flying by gyro, fixes and valve commands" in said
+        f"alpha/fusion: accelerometer {name} not believed: flying by gyro, fixes and valve commands"
+        in reported
     )
     # one state per sample, and it is right: the valves are known to have pushed
     states = flight.of(VehicleState, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)

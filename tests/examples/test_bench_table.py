@@ -39,8 +39,8 @@ def test_a_subject_measured_alone_leaves_the_others_as_they_were(bench, page):
 def test_a_new_subject_takes_its_place_in_the_order(bench, page):
     table = bench("table")
     table.write(page, {"star": table.section("Friday.", [])}, ORDER)
-    said = page.read_text()
-    assert said.index("### loop") < said.index("### star") < said.index("### fusion")
+    reported = page.read_text()
+    assert reported.index("### loop") < reported.index("### star") < reported.index("### fusion")
 
 
 def test_a_subject_that_is_no_more_leaves_the_page(bench, page):
@@ -58,9 +58,9 @@ def test_writing_the_same_twice_changes_nothing(bench, page):
 
 
 def test_the_page_keeps_everything_outside_its_marks(bench, page):
-    said = page.read_text()
-    assert said.startswith("before\n")
-    assert said.endswith("\nafter\n")
+    reported = page.read_text()
+    assert reported.startswith("before\n")
+    assert reported.endswith("\nafter\n")
     assert list(page.parent.iterdir()) == [page]
 
 

@@ -53,15 +53,15 @@ def test_a_picture_is_solved_to_a_tenth_of_a_millimetre():
 
 
 def test_the_bytes_of_a_recording_parse_again_without_loss(recording):
-    said = run("examples/parse_again.py", recording)
-    assert "version 2" in said
-    assert int(re.search(r"(\d+) samples", said)[1]) > 12 * 100 - 10
-    assert "frames_lost" not in said
+    reported = run("examples/parse_again.py", recording)
+    assert "version 2" in reported
+    assert int(re.search(r"(\d+) samples", reported)[1]) > 12 * 100 - 10
+    assert "frames_lost" not in reported
 
 
 def test_a_recording_compares_with_truth(recording):
-    said = run("examples/compare_with_truth.py", recording)
-    x_mm, y_mm = (float(number) for number in re.findall(r"[xy] ([\d.]+) mm", said)[:2])
+    reported = run("examples/compare_with_truth.py", recording)
+    x_mm, y_mm = (float(number) for number in re.findall(r"[xy] ([\d.]+) mm", reported)[:2])
     assert x_mm < 5.0  # fixes of 1 mm, one each 0.65 s, carried by the IMU between them
     assert y_mm < 5.0
 

@@ -48,10 +48,10 @@ def test_files_in_use_are_recorded_and_replay_is_exact_until_they_change(tmp_pat
     rig_path.write_text(text + "\n[mock_ups.standard.fusion]\nrest_s = 1.0\n")
     run_lockstep(load_rig(rig_path), read_text(rig_path), rig_path, path, 5.0, 5, lambda *_: None)
 
-    (said,), info, report = replayed(path)
-    assert said.names == ("table.map", "mock_ups.standard.imu.calibration.0")
-    assert said.contents == (table_map.read_text(), imu.read_text())
-    assert dict(zip(said.names, said.sha256, strict=True)).items() <= info.calibration_sha256.items()
+    (reported,), info, report = replayed(path)
+    assert reported.names == ("table.map", "mock_ups.standard.imu.calibration.0")
+    assert reported.contents == (table_map.read_text(), imu.read_text())
+    assert dict(zip(reported.names, reported.sha256, strict=True)).items() <= info.calibration_sha256.items()
     assert report.agrees
     assert not report.missing_inputs
     # advice on levelling finds the legs in the recorded rig

@@ -86,7 +86,7 @@ def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:
     """Frames that the ticks miss or that fusion never took, and frames seen."""
     taken = consumed(recording, f"{vehicle}/fusion", Imu)
     missing_ticks = 0
-    said: list[int] = []
+    reported: list[int] = []
     before: Imu | None = None
     for message in _messages(recording, Imu, vehicle):
         sample = message.payload
@@ -95,10 +95,10 @@ def _lost(recording: Recording, vehicle: str) -> tuple[int, int]:
             window = round(sample.window_s * 1e3)
             missing_ticks += round((sample.tick_ms - before.tick_ms) / window) - 1
         before = sample
-        said.append(message.envelope.sequence)
+        reported.append(message.envelope.sequence)
     journaled = max(taken, default=0)  # the last journal of a process may miss its last samples
-    never_taken = sum(sequence not in taken for sequence in said if sequence <= journaled)
-    return missing_ticks + never_taken, len(said)
+    never_taken = sum(sequence not in taken for sequence in reported if sequence <= journaled)
+    return missing_ticks + never_taken, len(reported)
 
 
 def _bytes_to_state_ms(recording: Recording, vehicle: str) -> list[float]:

@@ -46,14 +46,14 @@ def machine() -> str:
     )
 
 
-def section(said: str, rows: Sequence[Row]) -> str:
+def section(reported: str, rows: Sequence[Row]) -> str:
     """What stands below a subject's heading: circumstances and table."""
-    return f"{said}\n\n{markdown(rows)}"
+    return f"{reported}\n\n{markdown(rows)}"
 
 
-def subjects(said: str) -> list[str]:
+def subjects(reported: str) -> list[str]:
     """Subjects that a page has tables of, in its order."""
-    return _SECTION.findall(said.partition(BEGIN)[2].partition(END)[0])
+    return _SECTION.findall(reported.partition(BEGIN)[2].partition(END)[0])
 
 
 def write(page: Path, measured: Mapping[str, str], order: Sequence[str]) -> None:

@@ -26,7 +26,7 @@ _NAMED_AT_MOST = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """A surveyed ceiling with all that is to be said of it.
+    """A surveyed ceiling with all that is to be reported of it.
 
     Attributes:
         outcome: Numbers, warnings, figure; its camera has the height (and lens) as found.

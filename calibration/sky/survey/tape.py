@@ -1,7 +1,7 @@
 """Do the anchors, measured by tape, agree with the pictures and with each other?
 
-A similarity lays the map of the pictures on the tape's numbers. Its scale says whether the tape speaks
-in metres and of the stars that were clicked; what is left over says which anchor is wrong.
+A similarity lays the map of the pictures on the tape's numbers. Its scale states whether the tape speaks
+in metres and of the stars that were clicked; what is left over states which anchor is wrong.
 """
 
 from collections.abc import Sequence

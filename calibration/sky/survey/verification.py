@@ -64,7 +64,7 @@ class Verification:
 
 
 def sentence_of(found: Verification) -> str:
-    """Return what a verification says, in words."""
+    """Return what a verification states, in words."""
     if not found.solved:
         return f"verification: none of {found.pictures} pictures held out could be solved."
     words = (

@@ -1,4 +1,4 @@
-"""What a rig says of range finders."""
+"""Keys of a rig file for range finders."""
 
 from groundstation.declarations.section import NonNegative, Positive, Section
 

@@ -23,7 +23,7 @@ STATUS_EVERY = 2
 
 
 class ControllerNode(Node):
-    """Runs the control law of the rig; says nothing while the state is stale or the vehicle is not flying.
+    """Runs the control law of the rig; silent while the state is stale or the vehicle is not flying.
 
     Args:
         vehicle: Its name.

@@ -1,4 +1,4 @@
-"""What a rig says of controllers: the type gives the default, a vehicle may have its own."""
+"""Keys of a rig file for controllers: the type gives the default, a vehicle may have its own."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ class ControlOfType(Section):
 
 
 class ControlOfVehicle(Section):
-    """Keys of a vehicle; what it says stands in place of its type's section."""
+    """Keys of a vehicle; what it states stands in place of its type's section."""
 
     control: ControlSection | None = None
 

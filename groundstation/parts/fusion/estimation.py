@@ -1,4 +1,4 @@
-"""What a rig says to the estimators: noise, floor of the fixes, table map and calibrated constants."""
+"""What a rig states to the estimators: noise, floor of the fixes, table map and calibrated constants."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ class ForceStandIn:
     """Readings of both accelerometers of a sample, made up where one is not usable.
 
     Args:
-        estimator: Knows the offsets; it is told which axes it should not believe.
+        estimator: Knows the offsets; it is given which axes it should not believe.
         push: Commanded pulses of the valves.
         mass_kg: Of the vehicle.
         inertia_kg_m2: Likewise.
@@ -33,8 +33,8 @@ class ForceStandIn:
             return ""
         return f"accelerometer {' and '.join(lost)} not believed: flying by gyro, fixes and valve commands"
 
-    def hear(self, command: ValveCommand, now_ns: int) -> None:
-        """Take what the guard lets through, at the moment it is heard."""
+    def receive(self, command: ValveCommand, now_ns: int) -> None:
+        """Take what the guard lets through, at the moment it is received."""
         self._push.command(now_ns, command.pulse_id, command.on_time_ms)
 
     def forces(self, imu: Imu, span_s: float) -> tuple[float, float]:

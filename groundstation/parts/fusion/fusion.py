@@ -87,12 +87,12 @@ class Fusion(Node):
                 yield from self._correct(message, self._sources[type(message)], now_ns)
             case ValveStatus():
                 if message.floating or now_ns - self._float_ordered_ns >= ORDER_HOLDS_NS:
-                    self._hear_float(now_ns, floating=message.floating)
+                    self._receive_float(now_ns, floating=message.floating)
             case ValveCommand() if self._stand_in is not None:
-                self._stand_in.hear(message, now_ns)
+                self._stand_in.receive(message, now_ns)
             case Request(action="float_on"):
                 self._float_ordered_ns = now_ns
-                self._hear_float(now_ns, floating=True)
+                self._receive_float(now_ns, floating=True)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         yield from self._overdue(now_ns)
@@ -138,7 +138,7 @@ class Fusion(Node):
         state = self._estimator.add_imu(packet)
         for account in self._estimator.settled():
             if account.used or (account.t_exposure_ns, account.source) in self._waiting:  # else named overdue
-                yield from self._hear_account(account, imu.stamp_ns)
+                yield from self._receive_account(account, imu.stamp_ns)
         if state is not None:
             self._state = state
             yield self._say(state)
@@ -151,9 +151,9 @@ class Fusion(Node):
         account = self._estimator.add_fix(
             Fix(fix.stamp_ns, now_ns, fix.x_m, fix.y_m, fix.heading_rad, covariance, source)
         )
-        yield from self._hear_account(account, now_ns)
+        yield from self._receive_account(account, now_ns)
 
-    def _hear_account(self, account: FixOutcome, now_ns: int) -> Iterator[FixAccount]:
+    def _receive_account(self, account: FixOutcome, now_ns: int) -> Iterator[FixAccount]:
         """Pass on what became of a fix, once: when packets up to its exposure, or a second fix, are here."""
         if account.reason in (WAITS, CANDIDATE):
             self._waiting[account.t_exposure_ns, account.source] = now_ns, account
@@ -204,7 +204,7 @@ class Fusion(Node):
             self._fix_stamp_ns,
         )
 
-    def _hear_float(self, now_ns: int, *, floating: bool) -> None:
+    def _receive_float(self, now_ns: int, *, floating: bool) -> None:
         if not floating and self._rest_since_ns is None:
             self._rest_since_ns = now_ns
             self._estimator.begin_rest(now_ns)

@@ -1,4 +1,4 @@
-"""What a rig says of estimators."""
+"""Keys of a rig file for estimators."""
 
 from typing import Self
 

@@ -1,1 +1,1 @@
-"""What the IMU block says, from bytes to calibrated samples."""
+"""What the IMU block states, from bytes to calibrated samples."""

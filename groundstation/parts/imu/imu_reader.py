@@ -35,8 +35,8 @@ class ImuReader(Node):
         version: ``auto``, ``v1`` or ``v2``.
         baud: Of the line.
         latency_timer_s: Of the USB adapter.
-        averaging: Polls per frame. Version 2 says its own and is asked for this one if it differs;
-            version 1 does not say, so this is what it is taken to have.
+        averaging: Polls per frame. Version 2 states its own and is asked for this one if it differs;
+            version 1 does not state it, so this is what it is taken to have.
         serial_number: Of the block that belongs here, None if any may; version 1 cannot be asked.
         temperature_c: By an operator or another probe, for a block that sends none; NaN if unknown.
     """
@@ -142,7 +142,7 @@ class ImuReader(Node):
         return ""
 
     def _temperature_c(self) -> float:
-        """Mean of the chips that have spoken; before that, and with version 1, what the rig says."""
+        """Mean of the chips that have spoken; before that, and with version 1, what the rig states."""
         seen = self._environment
         chips = (seen.temperature_gyro_c, seen.temperature_tilt_x_c, seen.temperature_tilt_y_c)
         known = [value for value in chips if not math.isnan(value)]

@@ -1,4 +1,4 @@
-"""What the IMU block says, from bytes to calibrated samples."""
+"""What the IMU block states, from bytes to calibrated samples."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -49,7 +49,7 @@ class ImuRaw(Message):
         gyro_counts: Averaged offset-binary code.
         tilt_counts: x.X, x.Y, y.X, y.Y; empty where the frame has none (version 1).
         tilt_difference_counts: X - Y of the x and of the y chip.
-        status: Status bits of the firmware last heard, 0 if none.
+        status: Status bits of the firmware last received, 0 if none.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuRaw"

@@ -1,4 +1,4 @@
-"""What a rig says of IMU blocks."""
+"""Keys of a rig file for IMU blocks."""
 
 from typing import Literal
 

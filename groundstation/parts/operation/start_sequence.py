@@ -15,7 +15,7 @@ from groundstation.parts.valves.messages import ValveStatus, VehicleMode
 
 PERIOD_NS = 100_000_000
 PATIENCE_NS = 1_000_000_000
-GUARD_STARTED = ""  # author of the mode that a guard says when it starts
+GUARD_STARTED = ""  # author of the mode that a guard states when it starts
 
 
 class StartSequence(Node):

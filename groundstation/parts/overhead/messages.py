@@ -23,7 +23,7 @@ class OverheadImage(Message):
     """One colour picture of the camera over the table; the stamp is its arrival.
 
     Attributes:
-        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not say.
+        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not state it.
         height: Rows.
         width: Columns.
         encoding: ``bgr8``.

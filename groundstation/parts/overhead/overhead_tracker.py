@@ -25,7 +25,7 @@ class OverheadTracker(Node):
     Args:
         vehicles: Those to speak of; other mock-ups that the file of circles knows are told apart from them.
         camera: Calibration file of the camera.
-        circles: File that says what each mock-up wears.
+        circles: File that states what each mock-up wears.
         delay: From the middle of the exposure to a picture's stamp.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a rig says of the camera over the table."""
+"""Keys of a rig file for the camera over the table."""
 
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
@@ -7,7 +7,7 @@ from groundstation.declarations.section import NonNegative, Positive, Section
 class OverheadCameraSection(Section):
     """The camera over the table: where it is opened, its files, its delay and the floor of its errors.
 
-    ``circles`` says what each mock-up wears. The sigmas are what calibration of the camera and gluing of the
+    ``circles`` is what each mock-up wears. The sigmas are what calibration of the camera and gluing of the
     circles leave in every fix, beyond the covariance that comes with it.
     """
 

@@ -26,7 +26,7 @@ class StarImage(Message):
     """One grey picture of the star camera; the stamp is its arrival.
 
     Attributes:
-        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not say.
+        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not state it.
         height: Rows.
         width: Columns.
         encoding: ``mono8``.
@@ -49,7 +49,7 @@ class StarSpots(Message):
     """Spots of light found in one picture, brightest first; stamps and vehicle are the picture's.
 
     Attributes:
-        device_stamp_ns: When the camera's driver had the picture; 0 where it does not say.
+        device_stamp_ns: When the camera's driver had the picture; 0 where it does not state it.
         u_px: Column of each centre, pixel (0, 0) is the centre of the top-left pixel.
         v_px: Row of each centre.
         flux_dn: Light above the background.
@@ -132,7 +132,7 @@ class SkyChange(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StarMatches(Message):
-    """What the star tracker made of one picture: said of refused ones now and then, and on request.
+    """What the star tracker made of one picture: reported of refused ones now and then, and on request.
 
     Attributes:
         reason: Why there is no fix; empty for a fix.

@@ -50,7 +50,7 @@ def _camera(rig: Rig, vehicle: str) -> StarCameraSection:
 
 
 def _floor(rig: Rig, vehicle: str) -> Floor:
-    """An external pose stream says its errors itself."""
+    """An external pose stream states its errors itself."""
     camera = rig.of_type(vehicle, StarsOfType).star_camera
     if _has_stream(rig, vehicle) or camera is None:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What a rig says of star cameras and of streams of fixes."""
+"""Keys of a rig file for star cameras and of streams of fixes."""
 
 from typing import Self
 
@@ -29,7 +29,7 @@ class StarCameraSection(Section):
     @model_validator(mode="before")
     @classmethod
     def _one_delay(cls, given: object) -> object:
-        """Said before the file is looked for: which of the two was meant decides whether it must be there."""
+        """Refused before the file is looked for: which of the two was meant decides if it must exist."""
         if isinstance(given, dict) and "delay_file" in given and given.keys() & {"delay_s", "delay_sigma_s"}:
             raise ValueError("give either 'delay_file' or 'delay_s' and 'delay_sigma_s'")
         return given

@@ -32,7 +32,7 @@ class StarTracker(Node):
     """Finds the ceiling in every set of spots, and names stars that died, moved or appeared.
 
     It starts from a prior where the state is known, else lost in space. Stars that died or moved are
-    dropped until they are back. Of refused pictures, and when asked, it says which light is what.
+    dropped until they are back. Of refused pictures, and when asked, it states which light is what.
 
     Args:
         vehicle: Its name.

@@ -23,7 +23,7 @@ class AllocationNode(Node):
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         if isinstance(message, ValveCommand):
-            self._hear_gate(is_open=message.gate == "open")
+            self._receive_gate(is_open=message.gate == "open")
             return
         assert isinstance(message, Wrench)
         demand = BodyWrench((message.force_x_n, message.force_y_n), message.torque_z_nm)
@@ -36,7 +36,7 @@ class AllocationNode(Node):
             pulses.delivered.torque_nm,
         )
 
-    def _hear_gate(self, *, is_open: bool) -> None:
+    def _receive_gate(self, *, is_open: bool) -> None:
         """What was carried while the valves were closed is of no use when they open."""
         if is_open and not self._gate_open:
             self._modulator.reset()

@@ -80,7 +80,7 @@ class CommandMuxNode(Node):
                     message.heading_rad,
                     message.rate_rad_s,
                 )
-                self._choice.hear_state(now_ns)
+                self._choice.receive_state(now_ns)
             case Request(action="stop"):
                 self._choice.stop(f"asked for by {message.author}")
                 yield self._select(now_ns)

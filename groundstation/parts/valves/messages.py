@@ -32,7 +32,7 @@ class ValveSelection(Message):
     """What the command multiplexer chose, and whose it is.
 
     Attributes:
-        counter: Of the selections said, modulo 16.
+        counter: Of the selections reported, modulo 16.
         pulse_id: Changes with every new pulse, modulo 16.
         on_time_ms: Per valve, 0 to 127.
         source: ``stop``, ``brake``, ``operator``, ``controller`` or ``closed``.

@@ -1,4 +1,4 @@
-"""What a rig says of the valve bus."""
+"""Keys of a rig file for the valve bus."""
 
 from typing import Any
 

@@ -34,7 +34,7 @@ class ValveWriter(Node):
             case ValveCommand():
                 yield from self._command(message, now_ns)
             case CanIn():
-                yield from self._heard(message, now_ns)
+                yield from self._received(message, now_ns)
             case Request() if message.action in FLOAT_AIR:
                 try:
                     FLOAT_AIR[message.action].read(message)
@@ -57,23 +57,23 @@ class ValveWriter(Node):
         command = bus.ValveCommand(self._index, message.counter, message.pulse_id, tuple(message.on_time_ms))
         yield self._frame(command, now_ns)
 
-    def _heard(self, message: CanIn, now_ns: int) -> Iterator[Message]:
-        said = decode(CanFrame(message.arbitration_id, message.data))
-        match said:
-            case bus.TankPressure() if said.vehicle == self._index:
-                self._pressure_pa = said.tank_pa
-            case bus.ValveStatus() if said.vehicle == self._index:
-                self._floating = said.is_float_air_on
+    def _received(self, message: CanIn, now_ns: int) -> Iterator[Message]:
+        reported = decode(CanFrame(message.arbitration_id, message.data))
+        match reported:
+            case bus.TankPressure() if reported.vehicle == self._index:
+                self._pressure_pa = reported.tank_pa
+            case bus.ValveStatus() if reported.vehicle == self._index:
+                self._floating = reported.is_float_air_on
                 yield ValveStatus(
                     now_ns,
                     self.vehicle,
-                    said.open_mask,
-                    said.executed_counter,
-                    said.is_armed,
-                    said.is_dead_man_closed,
-                    said.is_float_air_on,
+                    reported.open_mask,
+                    reported.executed_counter,
+                    reported.is_armed,
+                    reported.is_dead_man_closed,
+                    reported.is_float_air_on,
                     self._pressure_pa,
-                    said.node_faults,
+                    reported.node_faults,
                 )
 
     def _float_order(self, now_ns: int) -> CanOut:
@@ -81,6 +81,6 @@ class ValveWriter(Node):
         order = bus.FloatAir(self._index, is_on=bool(self._wanted_float), counter=self._float_counter)
         return self._frame(order, now_ns)
 
-    def _frame(self, said: bus.ValveBusMessage, now_ns: int) -> CanOut:
-        frame = encode(said)
+    def _frame(self, reported: bus.ValveBusMessage, now_ns: int) -> CanOut:
+        frame = encode(reported)
         return CanOut(now_ns, self.vehicle, frame.arbitration_id, frame.data)

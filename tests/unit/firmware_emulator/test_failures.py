@@ -68,7 +68,7 @@ def fly(scene, failures, source, *, has_overhead=False):
     return arrivals
 
 
-def said(arrivals, until_ns=None):
+def reported(arrivals, until_ns=None):
     return [
         (a.stamp_ns, a.channel, a.data.image.tobytes() if hasattr(a.data, "image") else repr(a.data))
         for a in arrivals
@@ -85,15 +85,15 @@ def test_every_failure_of_the_table_acts_and_only_from_its_start(scene, kind):
         fly(scene, failures, source, has_overhead=has_overhead) for failures in ([], [failure], [failure])
     )
     start_ns = round(START_S * S)
-    assert said(ill, start_ns) == said(healthy, start_ns)
-    assert said(ill) != said(healthy)
-    assert said(ill) == said(again)
+    assert reported(ill, start_ns) == reported(healthy, start_ns)
+    assert reported(ill) != reported(healthy)
+    assert reported(ill) == reported(again)
 
 
 @pytest.mark.parametrize("kind", [k for k, row in FAILURE_KINDS.items() if row.device == "camera"])
 def test_camera_failures_act_on_drawn_fixes_too(scene, kind):
     failure = {"kind": kind, "vehicle": "alpha", "start_s": START_S}
-    assert said(fly(scene, [failure], "fixes")) != said(fly(scene, [], "fixes"))
+    assert reported(fly(scene, [failure], "fixes")) != reported(fly(scene, [], "fixes"))
 
 
 @pytest.mark.parametrize("kind", FAILURE_KINDS)

@@ -211,9 +211,9 @@ def test_a_node_obeys_nobody_until_it_is_armed_and_stops_at_once():
 
 
 def test_a_node_tells_its_pressure_and_that_it_lives():
-    heard = [decode(f) for f in stream(EmulatedLaboratory(scenario(), seed=1).advance(S), "valve_bus")]
-    pressures = [message for message in heard if isinstance(message, TankPressure)]
-    beats = [message for message in heard if isinstance(message, Heartbeat)]
+    received = [decode(f) for f in stream(EmulatedLaboratory(scenario(), seed=1).advance(S), "valve_bus")]
+    pressures = [message for message in received if isinstance(message, TankPressure)]
+    beats = [message for message in received if isinstance(message, Heartbeat)]
     assert len(pressures) == len(beats) == 4
     assert pressures[0].tank_pa == pytest.approx(20e6, rel=0.01)
 

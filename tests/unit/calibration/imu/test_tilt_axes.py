@@ -25,14 +25,20 @@ def on_blocks(rng, tilts, placed_rad=1e-4):
     return rests
 
 
-def turned(rng, slope, headings=8, said=(0.0, 0.0), noise_rad=3e-4):
+def turned(rng, slope, headings=8, reported=(0.0, 0.0), noise_rad=3e-4):
     rests = []
     for heading in 2.0 * math.pi * np.arange(headings) / headings:
         c, s = math.cos(heading), math.sin(heading)
         force = -np.array([[c, s], [-s, c]]) @ slope
         seen = float(heading + noise_rad * rng.normal())
         rests.append(
-            Rest(read(rng, force), (STD, STD), heading_rad=seen, heading_sigma_rad=noise_rad, slope_m_s2=said)
+            Rest(
+                read(rng, force),
+                (STD, STD),
+                heading_rad=seen,
+                heading_sigma_rad=noise_rad,
+                slope_m_s2=reported,
+            )
         )
     return rests
 
@@ -68,8 +74,8 @@ def test_a_known_slope_tells_the_rest_as_well():
     normal, slope = [], np.array([0.03, 0.01])
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        said = tuple(slope + 1e-4 * rng.normal(size=2))
-        found = tilt_axes(turned(rng, slope, said=said), 1e-4)
+        reported = tuple(slope + 1e-4 * rng.normal(size=2))
+        found = tilt_axes(turned(rng, slope, reported=reported), 1e-4)
         assert found.unknown == ()
         normal.append((found.matrix - M).ravel() / np.sqrt(np.diag(found.covariance))[2:6])
     assert 0.7 < np.square(normal).mean() < 1.4
@@ -92,7 +98,7 @@ def test_tilts_that_were_written_down_wrong_widen_the_sigmas():
 
 
 @pytest.mark.parametrize(
-    ("rests", "said"),
+    ("rests", "reported"),
     [
         (lambda rng: on_blocks(rng, BLOCKS[:2]), "at least 3 rests"),
         (lambda rng: on_blocks(rng, ((0.0, 0.0),) * 4), "too alike"),
@@ -100,6 +106,6 @@ def test_tilts_that_were_written_down_wrong_widen_the_sigmas():
         (lambda rng: [Rest(read(rng, np.zeros(2)), (STD, STD))] * 4, "heading"),
     ],
 )
-def test_rests_that_tell_nothing_are_refused(rests, said):
-    with pytest.raises(ValueError, match=said):
+def test_rests_that_tell_nothing_are_refused(rests, reported):
+    with pytest.raises(ValueError, match=reported):
         tilt_axes(rests(np.random.default_rng(6)))

@@ -66,8 +66,8 @@ def test_scales_of_the_emulated_block_are_found_and_a_rig_reads_them(run, blocks
     folder, paths = blocks
     out, plot = tmp_path / "tilt.toml", tmp_path / "tilt.png"
     files = ("--tilts", folder / "tilts.csv", "--out", out, "--plot", plot)
-    said = run("tilt", *paths, *files, "--tilt-sigma-deg", 0.001)
-    assert "5 rests" in said
+    reported = run("tilt", *paths, *files, "--tilt-sigma-deg", 0.001)
+    assert "5 rests" in reported
     found = tomllib.loads(out.read_text())
     for name, error in zip(("acc_scale_x", "acc_scale_y"), SCALE, strict=True):
         true = 1.0 - 1.0 / (1.0 + error)
@@ -87,8 +87,8 @@ def test_scales_of_the_emulated_block_are_found_and_a_rig_reads_them(run, blocks
 def test_what_the_rests_cannot_tell_is_said_and_written_as_unknown(run, blocks, tmp_path):
     _, paths = blocks
     (tmp_path / "tilts.csv").write_text("along_x_deg,along_y_deg\n0,0\n1.1459,0\n-1.1459,0\n")
-    said = run("tilt", *paths[:3], "--tilts", tmp_path / "tilts.csv", "--out", tmp_path / "t.toml")
-    assert "acc_scale_y: these rests do not determine it" in said
+    reported = run("tilt", *paths[:3], "--tilts", tmp_path / "tilts.csv", "--out", tmp_path / "t.toml")
+    assert "acc_scale_y: these rests do not determine it" in reported
     found = tomllib.loads((tmp_path / "t.toml").read_text())
     assert found["acc_scale_y"]["value"] != found["acc_scale_y"]["value"]  # nan
     assert found["unknown"]

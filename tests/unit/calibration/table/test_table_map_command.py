@@ -84,9 +84,9 @@ def test_a_folder_becomes_a_map_a_picture_and_advice(run, folder, tmp_path, made
     assert (error**2).mean() < 0.15 * truth.var(axis=0).mean()
     assert 0.1 < (error**2 / sigma**2).mean() < 1.5
     assert plot.read_bytes().startswith(b"\x89PNG")
-    said = tomllib.loads(out.read_text())
-    assert said["recordings"][0]["name"] == "laps"
-    assert said["mean"]["acceleration"]["unit"] == "m/s^2"
+    reported = tomllib.loads(out.read_text())
+    assert reported["recordings"][0]["name"] == "laps"
+    assert reported["mean"]["acceleration"]["unit"] == "m/s^2"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["laps", "map.npz", "map.png", "map.toml"]
 
 

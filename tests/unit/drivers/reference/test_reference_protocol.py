@@ -39,8 +39,8 @@ def test_poses_survive_any_chunking(poses, places):
     stream = b"".join(map(encode, poses))
     edges = [0, *sorted(min(place, len(stream)) for place in places), len(stream)]
     parser = PoseParser()
-    said = [p for a, b in itertools.pairwise(edges) for p in parser.feed(stream[a:b])]
-    assert said == poses
+    reported = [p for a, b in itertools.pairwise(edges) for p in parser.feed(stream[a:b])]
+    assert reported == poses
     assert parser.counters.frames_good == len(poses)
     assert parser.counters.bytes_skipped == parser.counters.frames_corrupt == 0
 
@@ -48,11 +48,11 @@ def test_poses_survive_any_chunking(poses, places):
 @given(st.binary(max_size=300), st.lists(st.integers(1, 50), max_size=10))
 def test_noise_never_raises_and_costs_no_good_frame(noise, sizes):
     stream = noise + encode(pose(5)) + noise + encode(pose(6)) + bytes(FRAME_SIZE)
-    parser, said = PoseParser(), []
+    parser, reported = PoseParser(), []
     for size in [*sizes, len(stream)]:
-        said += parser.feed(stream[:size])
+        reported += parser.feed(stream[:size])
         stream = stream[size:]
-    assert [p.sequence for p in said] == [5, 6]
+    assert [p.sequence for p in reported] == [5, 6]
 
 
 @given(st.integers(0, FRAME_SIZE * 8 - 1))
@@ -60,8 +60,8 @@ def test_a_flipped_bit_costs_one_frame(bit):
     broken = bytearray(encode(pose(1)))
     broken[bit // 8] ^= 1 << bit % 8
     parser = PoseParser()
-    said = parser.feed(encode(pose(0)) + bytes(broken) + encode(pose(2)))
-    assert [p.sequence for p in said] == [0, 2]
+    reported = parser.feed(encode(pose(0)) + bytes(broken) + encode(pose(2)))
+    assert [p.sequence for p in reported] == [0, 2]
     assert parser.counters.frames_lost == 1
     assert parser.counters.bytes_skipped == FRAME_SIZE
 
@@ -70,14 +70,14 @@ def test_a_flipped_bit_costs_one_frame(bit):
 def test_a_lost_byte_costs_one_frame(place):
     middle = encode(pose(1))
     parser = PoseParser()
-    said = parser.feed(encode(pose(0)) + middle[:place] + middle[place + 1 :] + encode(pose(2)))
-    assert [p.sequence for p in said] == [0, 2]
+    reported = parser.feed(encode(pose(0)) + middle[:place] + middle[place + 1 :] + encode(pose(2)))
+    assert [p.sequence for p in reported] == [0, 2]
 
 
 def test_a_header_inside_a_broken_frame_does_not_hide_the_next_frame():
     parser = PoseParser()
-    said = parser.feed(encode(pose(0))[:40] + encode(pose(1)) + encode(pose(2)) + encode(pose(3)))
-    assert [p.sequence for p in said] == [1, 2, 3]
+    reported = parser.feed(encode(pose(0))[:40] + encode(pose(1)) + encode(pose(2)) + encode(pose(3)))
+    assert [p.sequence for p in reported] == [1, 2, 3]
     assert parser.counters.frames_corrupt == 1
 
 

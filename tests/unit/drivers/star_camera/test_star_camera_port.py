@@ -133,8 +133,8 @@ def test_a_picture_is_read_once_and_its_stamp_is_its_arrival():
 @pytest.mark.parametrize("clock_s", [time.monotonic, time.time])
 def test_a_stamp_of_a_server_on_this_host_counts_instead_of_the_arrival(clock_s):
     ready = threading.Event()
-    taken_ns, said_s = time.monotonic_ns() - 500_000_000, clock_s() - 0.5
-    part = raw_part(picture(7), 0, f"X-Timestamp: {said_s:.6f}")
+    taken_ns, reported_s = time.monotonic_ns() - 500_000_000, clock_s() - 0.5
+    part = raw_part(picture(7), 0, f"X-Timestamp: {reported_s:.6f}")
     with serve(Script(part, ready)) as url, StarCamera.open(url) as camera:
         frame = camera.read(PATIENCE_S)
         assert abs(frame.stamp_ns - taken_ns) < 10_000_000  # two clocks read one after the other
@@ -163,8 +163,8 @@ def test_without_a_believable_stamp_the_arrival_counts(header):
 def test_a_stamp_is_believed_on_either_clock_if_it_lies_shortly_before_the_arrival(
     age_ns, arrival_ns, offset_ns, is_utc
 ):
-    said_ns = arrival_ns - age_ns + offset_ns * is_utc
-    found_ns = device_stamp_ns(said_ns * 1e-9, arrival_ns, offset_ns)
+    reported_ns = arrival_ns - age_ns + offset_ns * is_utc
+    found_ns = device_stamp_ns(reported_ns * 1e-9, arrival_ns, offset_ns)
     blur_ns = 1000  # of UTC seconds in a float
     if blur_ns < age_ns < 2_000_000_000 - blur_ns:
         assert abs(found_ns - (arrival_ns - age_ns)) <= blur_ns

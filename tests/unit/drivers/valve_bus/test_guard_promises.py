@@ -144,8 +144,8 @@ class GuardedValves(RuleBasedStateMachine):
 
     @invariant()
     def nothing_is_open_unless_armed_fresh_and_not_stopped(self):
-        heard = [stamp for stamp in self.advanced_at_ms if self.now_ms - stamp < 100]
-        if self.is_stopped or not self.is_armed or not heard:
+        received = [stamp for stamp in self.advanced_at_ms if self.now_ms - stamp < 100]
+        if self.is_stopped or not self.is_armed or not received:
             assert self.last.open_mask == 0
             assert self.last.gate is not Gate.OPEN
 

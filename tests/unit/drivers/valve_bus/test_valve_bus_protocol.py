@@ -77,19 +77,19 @@ def test_every_message_survives_its_frame(message):
     temperature=st.floats(0, 655.34),
 )
 def test_pressures_survive_to_half_a_step(tank, supply, temperature):
-    said = decode(encode(TankPressure(3, tank, supply, temperature)))
-    assert abs(said.tank_pa - tank) <= 500.0 * (1 + 1e-9)
-    assert abs(said.supply_pa - supply) <= 50.0 * (1 + 1e-9)
-    assert abs(said.gas_temperature_k - temperature) <= 0.005 * (1 + 1e-9)
+    reported = decode(encode(TankPressure(3, tank, supply, temperature)))
+    assert abs(reported.tank_pa - tank) <= 500.0 * (1 + 1e-9)
+    assert abs(reported.supply_pa - supply) <= 50.0 * (1 + 1e-9)
+    assert abs(reported.gas_temperature_k - temperature) <= 0.005 * (1 + 1e-9)
 
 
 def test_a_missing_sensor_reads_as_nan():
     frame = encode(TankPressure(0, math.nan, 600_000.0))
     assert frame.data == bytes.fromhex("ffff7017ffff")
-    said = decode(frame)
-    assert math.isnan(said.tank_pa)
-    assert math.isnan(said.gas_temperature_k)
-    assert said.supply_pa == 600_000.0
+    reported = decode(frame)
+    assert math.isnan(reported.tank_pa)
+    assert math.isnan(reported.gas_temperature_k)
+    assert reported.supply_pa == 600_000.0
 
 
 WORKED_EXAMPLES = {  # bit by bit in docs/interfaces/valve_bus.md
@@ -123,9 +123,9 @@ def test_a_command_is_packed_as_the_document_says():
 
 @given(st.integers(0, 0x7FF), st.binary(max_size=8))
 def test_no_frame_makes_the_decoder_raise(arbitration_id, data):
-    said = decode(CanFrame(arbitration_id, data))
-    if not isinstance(said, Undecodable):
-        assert decode(encode(said)) == said or isinstance(said, TankPressure)
+    reported = decode(CanFrame(arbitration_id, data))
+    if not isinstance(reported, Undecodable):
+        assert decode(encode(reported)) == reported or isinstance(reported, TankPressure)
 
 
 @given(st.binary(max_size=8), st.integers(0, 15))

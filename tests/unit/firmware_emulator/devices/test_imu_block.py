@@ -33,17 +33,17 @@ def block(failures=(), **imu):
 def talk(laboratory, until_ns, commands=(), parser=None):
     """Frames and replies until a stamp, after sending the commands now."""
     parser = parser or FrameParser(2)
-    said = []
+    reported = []
     for data in commands:
         laboratory.deliver(laboratory.next_arrival_ns(), "alpha/imu", data)
     for arrival in laboratory.advance(until_ns):
         if arrival.channel == "alpha/imu":
-            said += parser.feed(arrival.data)
-    return said
+            reported += parser.feed(arrival.data)
+    return reported
 
 
-def only(kind, said):
-    return [item for item in said if isinstance(item, kind)]
+def only(kind, reported):
+    return [item for item in reported if isinstance(item, kind)]
 
 
 def test_it_starts_with_rubbish_then_the_first_tick():
@@ -71,8 +71,8 @@ def test_a_fast_crystal_gains_on_the_host():
 def test_it_answers_ping_and_identify():
     laboratory = block(serial_number=77)
     talk(laboratory, S)
-    said = talk(laboratory, S + 50 * MS, [encode_ping(1), encode_identify(2)])
-    (pong,), (identity,) = only(Pong, said), only(Identity, said)
+    reported = talk(laboratory, S + 50 * MS, [encode_ping(1), encode_identify(2)])
+    (pong,), (identity,) = only(Pong, reported), only(Identity, reported)
     assert pong.tag == 1
     assert pong.tick_ms == pytest.approx(965, abs=3)
     assert (identity.tag, identity.serial_number, identity.sample_count) == (2, 77, 10)
@@ -93,9 +93,9 @@ def test_averaging_changes_with_the_next_window_and_no_poll_is_lost():
 def test_an_averaging_that_the_line_cannot_carry_is_refused_and_counted():
     laboratory = block(baud=115200)
     talk(laboratory, S)
-    said = talk(laboratory, S + 200 * MS, [encode_set_averaging(3, 1)])
-    assert only(Ack, said) == [Ack(3, 0x42, BAD_ARGUMENT)]
-    frames = only(ImuFrame, said)
+    reported = talk(laboratory, S + 200 * MS, [encode_set_averaging(3, 1)])
+    assert only(Ack, reported) == [Ack(3, 0x42, BAD_ARGUMENT)]
+    frames = only(ImuFrame, reported)
     assert {frame.sample_count for frame in frames} == {10}
     status = [f.housekeeping.value for f in frames if f.housekeeping.item is HousekeepingItem.STATUS][-1]
     assert status >> 8 == 1
@@ -118,9 +118,9 @@ def test_a_reset_starts_all_over_with_the_watchdog_bit():
     laboratory = block()
     parser = FrameParser(2)
     talk(laboratory, S, [encode_set_averaging(1, 20)], parser)
-    said = talk(laboratory, 2 * S, [encode_reset(9)], parser)
-    assert only(Ack, said)[-1] == Ack(9, 0x44, DONE)
-    frames = only(ImuFrame, said)
+    reported = talk(laboratory, 2 * S, [encode_reset(9)], parser)
+    assert only(Ack, reported)[-1] == Ack(9, 0x44, DONE)
+    frames = only(ImuFrame, reported)
     restarted = next(index for index, frame in enumerate(frames) if frame.tick_ms == 10)
     assert [frame.tick_ms for frame in frames[restarted : restarted + 3]] == [10, 20, 30]
     statuses = [f.housekeeping.value for f in frames[restarted:] if f.housekeeping.item == 3]
@@ -157,5 +157,5 @@ def test_a_dead_chip_shows_in_codes_and_status():
 def test_noise_on_the_receive_side_disturbs_nothing():
     laboratory = block()
     talk(laboratory, S)
-    said = talk(laboratory, S + 100 * MS, [bytes(range(256)), encode_ping(8)])
-    assert [pong.tag for pong in only(Pong, said)] == [8]
+    reported = talk(laboratory, S + 100 * MS, [bytes(range(256)), encode_ping(8)])
+    assert [pong.tag for pong in only(Pong, reported)] == [8]

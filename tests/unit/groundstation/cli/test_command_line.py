@@ -108,9 +108,9 @@ def test_a_broken_command_is_one_sentence_and_harms_no_other(
 ):
     install("waving", source, value)
     assert call(words) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert sentence in reported
+    assert reported.count("\n") == 1
     overview = groundstation("--help").output
     assert "replay " in overview
     assert words[0] in overview

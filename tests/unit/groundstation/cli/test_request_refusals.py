@@ -19,10 +19,10 @@ def own_folder(tmp_path, monkeypatch):
 
 def refused(capsys, *words):
     assert call(["request", *words]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    return said.err
+    reported = capsys.readouterr()
+    assert reported.out == ""
+    assert reported.err.count("\n") == 1
+    return reported.err
 
 
 @pytest.mark.parametrize(

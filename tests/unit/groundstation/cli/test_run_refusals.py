@@ -81,11 +81,11 @@ WRONG = {
 def refused(capsys, *words):
     """The one sentence that a refused call of the command leaves on stderr."""
     assert call([str(word) for word in words]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith("groundstation: ")
-    assert said.err.count("\n") == 1, said.err
-    return said.err
+    reported = capsys.readouterr()
+    assert reported.out == ""
+    assert reported.err.startswith("groundstation: ")
+    assert reported.err.count("\n") == 1, reported.err
+    return reported.err
 
 
 @pytest.mark.parametrize("what", WRONG)

@@ -86,9 +86,9 @@ def test_every_mock_up_of_every_picture_gets_a_row(folder, picture):
 def test_a_wrong_folder_is_refused_in_one_sentence(folder, capsys, spoil, sentence):
     spoil(folder)
     assert call(["star-tracker", "overhead", str(folder), "--out", str(folder / "answers.csv")]) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert sentence in reported
+    assert reported.count("\n") == 1
     assert not (folder / "answers.csv").exists()
 
 
@@ -131,7 +131,7 @@ def test_wrong_places_are_refused_in_one_sentence(folder, capsys, places, senten
     cv2.imwrite(str(folder / "frames" / "a.png"), np.full((720, 960, 3), 90, np.uint8))
     (folder / "places.csv").write_text(places)
     assert call(["star-tracker", "overhead-pose", str(folder), "--out", str(folder / "pose.toml")]) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert sentence in reported
+    assert reported.count("\n") == 1
     assert not (folder / "pose.toml").exists()

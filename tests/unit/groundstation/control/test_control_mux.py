@@ -13,7 +13,7 @@ def mux():
 
 
 def test_a_fresh_controller_commands(mux):
-    mux.hear_state(0)
+    mux.receive_state(0)
     mux.control("hold", 0)
     chosen = mux.select(20 * MS)
     assert (chosen.source, chosen.demand, chosen.is_new) == (Source.CONTROLLER, "hold", True)
@@ -29,7 +29,7 @@ def test_the_operator_overrides_the_controller_and_hands_back_by_falling_silent(
 
 
 def test_brake_overrides_operator_and_controller(mux):
-    mux.hear_state(0)
+    mux.receive_state(0)
     mux.control("hold", 0)
     mux.operate("left", 0)
     mux.brake(0, "edge ahead")
@@ -38,31 +38,31 @@ def test_brake_overrides_operator_and_controller(mux):
 
 
 def test_a_brake_that_is_not_repeated_ends(mux):
-    mux.hear_state(0)
+    mux.receive_state(0)
     mux.brake(0, "edge ahead")
     mux.control("hold", 290 * MS)
-    mux.hear_state(290 * MS)
+    mux.receive_state(290 * MS)
     assert mux.select(300 * MS).source is Source.BRAKE
     assert mux.select(301 * MS).source is Source.CONTROLLER
 
 
 def test_silence_of_the_controller_brakes_for_closed_valves_mean_coasting(mux):
     mux.control("hold", 0)
-    mux.hear_state(400 * MS)
+    mux.receive_state(400 * MS)
     chosen = mux.select(400 * MS)
     assert chosen.source is Source.BRAKE
     assert chosen.reason == "controller silent for 400 ms"
 
 
 def test_a_controller_that_never_spoke_brakes_too(mux):
-    mux.hear_state(0)
+    mux.receive_state(0)
     assert mux.select(0).reason == "controller not heard yet"
     assert mux.select(0).source is Source.BRAKE
 
 
 def test_without_a_fresh_state_nothing_can_brake_and_all_valves_close(mux):
     assert mux.select(0).source is Source.CLOSED
-    mux.hear_state(0)
+    mux.receive_state(0)
     mux.brake(100 * MS, "operator")
     assert mux.select(100 * MS).source is Source.BRAKE
     late = mux.select(101 * MS)
@@ -73,7 +73,7 @@ def test_without_a_fresh_state_nothing_can_brake_and_all_valves_close(mux):
 def test_a_stop_beats_everything_and_does_not_grow_old(mux):
     mux.stop("red button")
     for stamp_ns in (0, 10**12):
-        mux.hear_state(stamp_ns)
+        mux.receive_state(stamp_ns)
         mux.brake(stamp_ns, "operator")
         mux.operate("left", stamp_ns)
         mux.control("hold", stamp_ns)
@@ -82,7 +82,7 @@ def test_a_stop_beats_everything_and_does_not_grow_old(mux):
 
 
 def test_after_a_stop_old_demands_do_not_come_back_to_life(mux):
-    mux.hear_state(0)
+    mux.receive_state(0)
     mux.control("hold", 0)
     mux.stop("red button")
     mux.release_stop()
@@ -97,7 +97,7 @@ def test_every_source_has_a_freshness_of_its_own(key):
         **{**dict.fromkeys(("brake_s", "operator_s", "controller_s", "state_s"), 10.0), key: 0.05}
     )
     mux = CommandMux[str](config)
-    mux.hear_state(0)
+    mux.receive_state(0)
     offers = {
         "brake_s": lambda: mux.brake(0, "x"),
         "operator_s": lambda: mux.operate("left", 0),

@@ -52,15 +52,15 @@ def test_an_installed_wheel_works_and_leaves_the_tree_as_it_was(clean_tree, tmp_
     options = ("install", "--no-deps", "--no-index", "--no-build-isolation", "--target", site)
     subprocess.run([*PIP, *options, clean_tree], check=True, cwd=tmp_path)
     assert contents(clean_tree) == before
-    said = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-S", "-c", f"import sys; sys.path += {[str(site), *sys.path]}\n{RUN}"],
         capture_output=True,
         text=True,
         check=True,
         cwd=tmp_path,
     ).stdout.split()
-    assert said[0].startswith(str(site))
-    assert said[1] == "core"
+    assert reported[0].startswith(str(site))
+    assert reported[1] == "core"
     assert (site / "groundstation" / "core" / LIBRARY).exists()
 
 

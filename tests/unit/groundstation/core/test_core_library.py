@@ -59,8 +59,8 @@ def test_without_a_core_commands_say_so_in_a_sentence(
         assert call(["run", "examples/rigs/two_mock_ups.toml"]) == 1
     finally:
         default_core.cache_clear()
-    said = capsys.readouterr().err
-    assert said == f"groundstation: there is no compiled core in {tmp_path}: run make, or install again\n"
+    reported = capsys.readouterr().err
+    assert reported == f"groundstation: there is no compiled core in {tmp_path}: run make, or install again\n"
 
 
 def test_a_compiler_that_is_named_and_missing_is_an_error(

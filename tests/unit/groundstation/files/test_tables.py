@@ -36,7 +36,7 @@ def test_a_table_may_come_from_any_program(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("", "is empty, expected the header id,x_m,y_m"),
         ("id,x_m,y_m\n", "has a header but no rows"),
@@ -52,13 +52,13 @@ def test_a_table_may_come_from_any_program(text):
         (PLAIN + '2,"1,3\n', "line 4 is no row of a table"),
     ],
 )
-def test_what_is_wrong_is_named_by_line_and_column(text, said):
-    with pytest.raises(FileError, match=r"^table\.csv: " + said):
+def test_what_is_wrong_is_named_by_line_and_column(text, reported):
+    with pytest.raises(FileError, match=r"^table\.csv: " + reported):
         parse_table(text.encode(), PATH, ("x_m", "y_m"), ("id",), unique=("id",))
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("t_s,x_m\n0,1\n1,none\n", "line 3, x_m is 'none', expected a number"),
         ("t_s,x_m\n0,1\n1,2,3\n4\n", "line 3 has 3 columns, expected 2"),
@@ -66,8 +66,8 @@ def test_what_is_wrong_is_named_by_line_and_column(text, said):
         ("t_s,x_m\n0,1\n1;2\n", "line 3 has 1 columns, expected 2"),
     ],
 )
-def test_numbers_alone_are_judged_as_strictly(text, said):
-    with pytest.raises(FileError, match=said):
+def test_numbers_alone_are_judged_as_strictly(text, reported):
+    with pytest.raises(FileError, match=reported):
         parse_table(text.encode(), PATH, ("t_s", "x_m"))
 
 

@@ -129,12 +129,12 @@ def test_the_filter_on_oracles_estimates_the_same(monkeypatch):
     filters.append(ErrorStateFilter(NOISE))
     for number in range(1, 1200):
         readings_now = rng.normal(0.0, 1e-3, 3)
-        said = [f.add_imu(ImuPacket(number * PERIOD_NS, 0.01, *readings_now, 25.0)) for f in filters]
+        reported = [f.add_imu(ImuPacket(number * PERIOD_NS, 0.01, *readings_now, 25.0)) for f in filters]
         if number % 65 == 0:
             place = rng.normal(0.0, 1e-3, 3)
             for f in filters:
                 f.add_fix(Fix((number - 60) * PERIOD_NS, number * PERIOD_NS, *place, covariance))
-        reports.append(said)
+        reports.append(reported)
     assert filters[0].counters.by_name == filters[1].counters.by_name
     assert reports[-1][0] is not None
     for compiled, pure in reports:

@@ -41,7 +41,7 @@ def index(tmp_path):
 def test_a_message_said_while_handling_an_input_was_triggered_by_it(index):
     origin = index[Cause(IMU, "alpha", 2)]
     assert origin.causes == (Cause(IMU_BYTES, "alpha", 2),)
-    assert (origin.node, origin.told_ns, origin.wall_ns) == ("alpha/imu_reader", 200, 7)
+    assert (origin.node, origin.given_ns, origin.wall_ns) == ("alpha/imu_reader", 200, 7)
 
 
 def test_a_message_said_in_a_tick_comes_from_the_newest_inputs(index):

@@ -29,11 +29,11 @@ def call(*arguments):
 
 
 def test_info_names_rig_clock_and_every_topic(path):
-    said = call("info", path)
-    assert "two mock-ups" in said
-    assert "clock: virtual; seed: 7" in said
-    assert "a.camera: sha256 0123012301230123" in said
-    row = next(line.split() for line in said.splitlines() if line.startswith("imu_bytes"))
+    reported = call("info", path)
+    assert "two mock-ups" in reported
+    assert "clock: virtual; seed: 7" in reported
+    assert "a.camera: sha256 0123012301230123" in reported
+    row = next(line.split() for line in reported.splitlines() if line.startswith("imu_bytes"))
     assert row == ["imu_bytes", "alpha", "120", "100.0"]
 
 
@@ -46,10 +46,10 @@ def test_info_of_a_live_recording_names_the_date(tmp_path, flight):
 def test_recover_takes_the_name_that_the_finished_file_would_have(tmp_path, path):
     torn = tmp_path / "torn.mcap.part"
     torn.write_bytes(path.read_bytes()[:5000])
-    said = call("recover", torn)
+    reported = call("recover", torn)
     assert (tmp_path / "torn.mcap").exists()
     with Recording(tmp_path / "torn.mcap") as recording:
-        assert f"{len(list(recording.messages(installed_tables().payloads.values())))} messages" in said
+        assert f"{len(list(recording.messages(installed_tables().payloads.values())))} messages" in reported
     call("recover", torn)
     assert (tmp_path / "torn_recovered.mcap").exists()
 

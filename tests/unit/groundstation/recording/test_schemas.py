@@ -154,10 +154,10 @@ def test_a_recording_of_the_first_format_is_refused_in_a_sentence(tmp_path, meta
 
 
 @pytest.mark.parametrize(
-    ("said", "sentence"),
+    ("reported", "sentence"),
     [("3", "recording format 3, this program reads format 2"), ("two", "metadata record")],
 )
-def test_a_recording_of_a_format_to_come_is_refused_in_a_sentence(tmp_path, said, sentence):
-    path = write(tmp_path / "x.mcap", schema_text(StarFix), b"", {"format": said})
+def test_a_recording_of_a_format_to_come_is_refused_in_a_sentence(tmp_path, reported, sentence):
+    path = write(tmp_path / "x.mcap", schema_text(StarFix), b"", {"format": reported})
     with pytest.raises(RecordingError, match=sentence):
         Recording(path)

@@ -118,9 +118,9 @@ def test_provenance_comes_back(tmp_path):
 
 
 def test_a_recording_in_virtual_time_names_no_date():
-    said = RecordingInfo(seed=3).to_metadata()
-    assert said["clock"] == "virtual"
-    assert "utc_offset_ns" not in said
+    reported = RecordingInfo(seed=3).to_metadata()
+    assert reported["clock"] == "virtual"
+    assert "utc_offset_ns" not in reported
 
 
 def test_an_open_recording_is_a_part_and_loses_at_most_a_quarter_of_a_second(tmp_path, flight):

@@ -77,8 +77,8 @@ def test_extra_nodes_receive_tick_and_stop_like_those_of_the_rig():
     assert (watcher.ticks, watcher.stops) == (120, 0)
     runner.close()
     assert watcher.stops == 1
-    said = [d.payload.summary for _, d in kept.of(Diagnostics) if d.payload.node == "watcher"]
-    assert said == ["starting", f"{watcher.states} states"]
+    reported = [d.payload.summary for _, d in kept.of(Diagnostics) if d.payload.node == "watcher"]
+    assert reported == ["starting", f"{watcher.states} states"]
 
 
 def test_what_nodes_publish_when_they_stop_is_seen_and_journaled_before_the_laboratory_goes():

@@ -81,12 +81,12 @@ class Laboratory:
         if (envelope.topic.noun, envelope.sequence) not in self.lose:
             self.recorder.record(Delivered(envelope, payload), log_ns)
 
-    def call(self, node, kind, said, now_ns, consumed=None):
+    def call(self, node, kind, reported, now_ns, consumed=None):
         noun, owner, number = ("", PROCESS, 0)
         if consumed is not None:
             noun, owner, number = consumed.topic.noun, consumed.owner, consumed.sequence
         self.journal.note(kind, f"{node.vehicle}/adder", noun, owner, number, now_ns)
-        for payload in said:
+        for payload in reported:
             envelope = self.envelope(payload, now_ns + self.late_ns)
             self.journal.note(
                 Kind.OUTPUT, f"{node.vehicle}/adder", envelope.topic.noun, envelope.owner,
@@ -214,11 +214,13 @@ def test_one_vehicle_can_be_replayed_alone(path):
 def test_a_changed_node_is_found_with_field_and_sequence(path):
     class Changed(Adder):
         def receive(self, message, now_ns):
-            for said in super().receive(message, now_ns):
-                if said.stamp_ns < 21 * STEP_NS:
-                    yield said
+            for reported in super().receive(message, now_ns):
+                if reported.stamp_ns < 21 * STEP_NS:
+                    yield reported
                 else:
-                    yield Wrench(said.stamp_ns, said.vehicle, said.force_x_n, 0.0, 0.0, 0.0, 0.0, 9.0)
+                    yield Wrench(
+                        reported.stamp_ns, reported.vehicle, reported.force_x_n, 0.0, 0.0, 0.0, 0.0, 9.0
+                    )
 
     report = replay(path, Changed, nodes=["alpha/adder"])
     result = next(r for r in report.results if r.noun == "wrench")

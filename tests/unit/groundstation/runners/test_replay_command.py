@@ -36,20 +36,20 @@ def call(*arguments):
 
 
 def test_every_node_of_the_flight_replays_bit_for_bit(flight):
-    code, said = call(flight)
-    assert code == 0, said
-    assert "all agrees" in said
-    assert "state " in said
+    code, reported = call(flight)
+    assert code == 0, reported
+    assert "all agrees" in reported
+    assert "state " in reported
 
 
 def test_replay_tells_when_other_code_recorded(flight, monkeypatch):
     with Recording(flight) as found:
         assert default_core().name in found.info.software
     monkeypatch.setattr("groundstation.cli.replay.software", lambda: "another ground station")
-    code, said = call(flight)
+    code, reported = call(flight)
     assert code == 0
-    assert default_core().name in " ".join(said.split())
-    assert "replayed with another ground station" in " ".join(said.split())
+    assert default_core().name in " ".join(reported.split())
+    assert "replayed with another ground station" in " ".join(reported.split())
 
 
 def test_equal_seeds_give_equal_files(tmp_path, flight):
@@ -61,9 +61,9 @@ def test_one_node_with_another_rig_is_compared_and_written(tmp_path, flight):
     assert count == 1
     rig, out = tmp_path / "changed.toml", tmp_path / "fusion.mcap"
     rig.write_text(changed)
-    code, said = call(flight, "--node", "alpha/fusion", "--rig", rig, "--out", out)
+    code, reported = call(flight, "--node", "alpha/fusion", "--rig", rig, "--out", out)
     assert code == 1
-    assert "first difference in" in said
+    assert "first difference in" in reported
     with Recording(out) as now, Recording(flight) as then:
         assert now.info.rig_toml == changed
         assert [r.log_ns for r in now.messages([VehicleState])] == [
@@ -97,5 +97,5 @@ def test_a_refused_replay_leaves_no_file(tmp_path, flight):
 
 @pytest.mark.slow
 def test_a_flight_to_its_station_replays_bit_for_bit(tmp_path):
-    code, said = call(fly(tmp_path / "long.mcap", 40.0))
-    assert code == 0, said
+    code, reported = call(fly(tmp_path / "long.mcap", 40.0))
+    assert code == 0, reported

@@ -45,14 +45,14 @@ class Sky:
 
     def tell(self, message):
         """All that is said because of a message, by class."""
-        said, waiting = {}, [message]
+        reported, waiting = {}, [message]
         while waiting:
-            heard = waiting.pop(0)
+            received = waiting.pop(0)
             for node in self.nodes:
-                if isinstance(heard, node.inputs):
-                    waiting += node.receive(heard, heard.stamp_ns)
-            said.setdefault(type(heard), []).append(heard)
-        return said
+                if isinstance(received, node.inputs):
+                    waiting += node.receive(received, received.stamp_ns)
+            reported.setdefault(type(received), []).append(received)
+        return reported
 
     def show(self, image):
         """All that is said of the next picture."""
@@ -74,10 +74,10 @@ def sky(tmp_path, painter):
     return Sky(tmp_path, painter)
 
 
-def reason_of(said):
-    (fix,) = said[StarFix]
+def reason_of(reported):
+    (fix,) = reported[StarFix]
     assert fix.fix == (fix.reason == "")
-    (image,) = said[StarImage]
+    (image,) = reported[StarImage]
     assert fix.stamp_ns == image.stamp_ns - DELAY_NS  # the middle of the exposure, not the arrival
     assert fix.stamp_sigma_s == DELAY.delay_sigma_s
     return fix.reason.partition(":")[0]
@@ -90,9 +90,9 @@ def test_a_refused_picture_comes_without_loss_and_its_stars_lie_where_the_filter
     lit[seen[:2]] = True  # of all the stars only two shine
     image = painter.paint(rng, POSE, lit=lit)
     sky.believe(POSE)
-    said = sky.show(image)
-    assert reason_of(said) == "too few stars"
-    (picture,), (matches,) = said[StarPicture], said[StarMatches]
+    reported = sky.show(image)
+    assert reason_of(reported) == "too few stars"
+    (picture,), (matches,) = reported[StarPicture], reported[StarMatches]
     assert picture.stamp_ns == matches.stamp_ns == sky.stamp_ns
     assert picture.format == "png"
     back = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -113,8 +113,8 @@ def test_without_any_belief_the_lights_are_shown_and_no_star(sky):
     rng = np.random.default_rng(2)
     image = np.clip(rng.normal(10, 1, (480, 640)), 0, 255).astype(np.uint8)
     cv2.circle(image, (200, 100), 2, 200, -1)
-    said = sky.show(image)
-    notes = notes_of(said[StarMatches][0])
+    reported = sky.show(image)
+    notes = notes_of(reported[StarMatches][0])
     assert (notes.basis, notes.stars, notes.kind.tolist()) == ("", (), [SpotKind.LIGHT])
 
 
@@ -146,8 +146,8 @@ def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     assert StarMatches not in sky.show(image)
     (ack,) = sky.tell(Request(sky.stamp_ns, "alpha", 7, "me", "picture", ""))[Ack]
     assert ack.accepted
-    said = sky.show(image)
-    (fix,), (matches,) = said[StarFix], said[StarMatches]
+    reported = sky.show(image)
+    (fix,), (matches,) = reported[StarFix], reported[StarMatches]
     notes = notes_of(matches)
     assert notes.basis == "fix"
     assert int((notes.kind == SpotKind.STAR).sum()) == fix.stars
@@ -155,15 +155,15 @@ def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     assert int(seen.sum()) == fix.stars
     gap = np.hypot(*(notes.star_px[seen] - notes.spot_px[notes.spot_of_star[seen]]).T)
     assert gap.max() < 0.5
-    assert StarPicture in said
+    assert StarPicture in reported
     assert StarMatches not in sky.show(image)
 
 
 def test_a_picture_that_is_no_longer_held_is_not_said(sky, painter):
     keeper = PictureKeeper("alpha")
     dark = np.zeros((480, 640), np.uint8)
-    said = sky.show(dark)
-    (image,), (matches,) = said[StarImage], said[StarMatches]
+    reported = sky.show(dark)
+    (image,), (matches,) = reported[StarImage], reported[StarMatches]
     assert list(keeper.receive(image, 0)) == []
     assert len(list(keeper.receive(matches, 0))) == 1
     late = StarImage(image.stamp_ns + 4_000_000_000, "alpha", 0, 480, 640, "mono8", 640, dark.tobytes())

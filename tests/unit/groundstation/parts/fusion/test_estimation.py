@@ -93,7 +93,7 @@ def test_constants_of_files_are_weighed_against_the_rigs(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("table", "imu", "said"),
+    ("table", "imu", "reported"),
     [
         ('map = "nowhere.toml"', "", r"table\.map: .*nowhere\.toml: cannot be read"),
         ('map = "torn.toml"', "", r"table\.map: .*torn\.toml: is not valid TOML"),
@@ -103,18 +103,18 @@ def test_constants_of_files_are_weighed_against_the_rigs(tmp_path):
         ("", 'calibration = ["unit.toml"]', r"unit\.toml: lever_x must be in the unit 'm', found 'mm'"),
     ],
 )
-def test_a_wrong_file_is_one_sentence_before_anything_starts(tmp_path, table, imu, said):
+def test_a_wrong_file_is_one_sentence_before_anything_starts(tmp_path, table, imu, reported):
     (tmp_path / "torn.toml").write_text("[grid")
     write_constants(tmp_path / "joint.toml", gyro_scale=(4e-3, 1e-4, "1"))
     write_constants(tmp_path / "rest.toml", omega_offset=(4e-3, 1e-4, "rad/s"))
     write_constants(tmp_path / "unit.toml", lever_x=(35.0, 1.0, "mm"))
-    with pytest.raises(RigError, match=said) as found:
+    with pytest.raises(RigError, match=reported) as found:
         rig_of(tmp_path, table, imu)
     assert "\n" not in str(found.value)
 
 
 @pytest.mark.parametrize(
-    ("table", "more", "said"),
+    ("table", "more", "reported"),
     [
         ("legs = { A = [0.0, 0.0], B = [1.0, 0.0] }", "", "table: legs: a table needs at least three legs"),
         ("legs = { A = [0.0, 0.0], B = [1.0, 0.0], C = [2.0, 0.0] }", "", "legs stand on one line"),
@@ -122,7 +122,7 @@ def test_a_wrong_file_is_one_sentence_before_anything_starts(tmp_path, table, im
         ("slope_sigma_m_s2 = 0.0", "", "table.slope_sigma_m_s2"),
     ],
 )
-def test_keys_that_cannot_be_are_refused(tmp_path, table, more, said):
+def test_keys_that_cannot_be_are_refused(tmp_path, table, more, reported):
     write_map(tmp_path / "m.toml")
-    with pytest.raises(RigError, match=re.escape(said)):
+    with pytest.raises(RigError, match=re.escape(reported)):
         rig_of(tmp_path, table, more=more)

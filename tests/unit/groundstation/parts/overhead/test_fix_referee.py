@@ -44,20 +44,22 @@ def referee_says(seed, bias=(0.0, 0.0, 0.0), star_delay_ms=600, until_ms=12_000)
         (t + star_delay_ms, star(t, rng.normal(0, STD) + np.array(bias))) for t in range(90, until_ms, 650)
     ]
     node = FixReferee("alpha", (0.0, 0.0), (0.0, 0.0))
-    said = []
+    reported = []
     for t_ms, message in sorted(arrivals, key=lambda item: item[0]):
-        said += node.receive(message, t_ms * MS)
-    return said
+        reported += node.receive(message, t_ms * MS)
+    return reported
 
 
 @pytest.mark.parametrize("delay_ms", [5, 600])
 def test_honest_sources_agree_and_their_differences_are_as_large_as_they_say(delay_ms):
-    said = [pair for seed in range(8) for pair in referee_says(seed, star_delay_ms=delay_ms)]
-    assert len(said) >= 8 * 16
-    assert max(abs(pair.apart_s) for pair in said) <= 0.05
-    assert {pair.verdict for pair in said} == {"too few", "agree"}
-    assert 0.8 < np.mean([pair.nis for pair in said]) / 3 < 1.25
-    assert [pair.verdict for pair in said if pair.pairs < MIN_PAIRS] == ["too few"] * (8 * (MIN_PAIRS - 1))
+    reported = [pair for seed in range(8) for pair in referee_says(seed, star_delay_ms=delay_ms)]
+    assert len(reported) >= 8 * 16
+    assert max(abs(pair.apart_s) for pair in reported) <= 0.05
+    assert {pair.verdict for pair in reported} == {"too few", "agree"}
+    assert 0.8 < np.mean([pair.nis for pair in reported]) / 3 < 1.25
+    assert [pair.verdict for pair in reported if pair.pairs < MIN_PAIRS] == ["too few"] * (
+        8 * (MIN_PAIRS - 1)
+    )
 
 
 @pytest.mark.parametrize(

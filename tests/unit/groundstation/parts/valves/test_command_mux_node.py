@@ -53,7 +53,7 @@ def push(**arguments):
     )
 
 
-def said(outputs, kind):
+def reported(outputs, kind):
     return [message for message in outputs if isinstance(message, kind)]
 
 
@@ -95,7 +95,7 @@ def test_a_vehicle_that_would_leave_the_table_is_braked_whatever_the_controller_
 
 def test_a_push_by_hand_outranks_the_controller_and_ends_by_itself(mux):
     list(mux.receive(state(0), 0))
-    (ack,) = said(mux.receive(push(), 0), Ack)
+    (ack,) = reported(mux.receive(push(), 0), Ack)
     assert ack.accepted
     sources = []
     for step in range(1, 40):
