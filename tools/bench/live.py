@@ -18,7 +18,7 @@ from groundstation.recording.reader import Recorded, Recording
 from groundstation.rig.read import load_rig
 
 RIG = RIGS / "two_mock_ups.toml"
-STATE_MS = (2.0, 10.0)
+STATE_MS = (0.6, 6.0)
 FIX_P99_MS = 30.0
 WARM_UP_S = 10.0
 """Of processes that have just started; left out of the ages, not out of the losses."""
