@@ -1,4 +1,4 @@
-"""Keys of a rig file for motion capture: the system, how its frame lies to the table, and its rigid bodies."""
+"""Keys of a rig file for motion capture: the system, its frame on the table, and its rigid bodies."""
 
 from typing import Any, Literal
 

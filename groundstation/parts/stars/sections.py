@@ -1,4 +1,4 @@
-"""Keys of a rig file for star cameras and of streams of fixes."""
+"""Keys of a rig file for star cameras and for streams of fixes."""
 
 from typing import Self
 
