@@ -21,6 +21,20 @@ def installed_tables() -> Tables:
     Raises:
         UsageError: A part of an installed package cannot be loaded or clashes with another.
     """
+    points = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name)
+    try:
+        return Tables((*_own_parts(), *map(_load, points)), topics=(Journal,))
+    except PartError as error:
+        raise UsageError(str(error)) from error
+
+
+@cache
+def own_tables() -> Tables:
+    """The tables of the tree's own parts: for what must work whatever else is installed, such as a stop."""
+    return Tables(_own_parts(), topics=(Journal,))
+
+
+def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.control.part import PART as CONTROL
     from groundstation.parts.fusion.part import PART as FUSION
     from groundstation.parts.imu.part import PART as IMU
@@ -31,12 +45,7 @@ def installed_tables() -> Tables:
     from groundstation.parts.stars.part import PART as STARS
     from groundstation.parts.valves.part import PART as VALVES
 
-    own = (VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE)
-    points = sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name)
-    try:
-        return Tables((*own, *map(_load, points)), topics=(Journal,))
-    except PartError as error:
-        raise UsageError(str(error)) from error
+    return VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
 
 
 def _load(point: EntryPoint) -> Part:

@@ -1,5 +1,7 @@
 """A package whose part cannot be used is named in one sentence, whatever its import does."""
 
+import os
+import subprocess
 import sys
 from importlib.metadata import EntryPoint
 
@@ -27,3 +29,18 @@ def test_a_part_that_cannot_be_used_is_named(source, why, tmp_path, monkeypatch)
     with pytest.raises(UsageError) as refusal:
         table.installed_tables.__wrapped__()
     assert str(refusal.value) == f"the part 'broken' of the package broken_part (broken_part:PART) {why}"
+
+
+def test_a_stop_can_be_requested_whatever_else_is_installed(tmp_path):
+    """In a process of its own: a package that is broken, installed as pip would."""
+    (tmp_path / "broken_part.py").write_text("raise RuntimeError('no licence')")
+    info = tmp_path / "broken-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[{table.ENTRY_POINT_GROUP}]\nbroken = broken_part:PART\n")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path)}
+    command = [sys.executable, "-m", "groundstation", "request", "alpha", "stop"]
+    asked = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert "'broken' of the package broken" in asked.stderr
+    assert "its actions are left out" in asked.stderr
+    assert "no rig is running" in asked.stderr, "it came as far as looking for the run"
