@@ -14,6 +14,7 @@ from groundstation.declarations.rig import Rig
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.stars.sections import StarsOfType
 from groundstation.recording.reader import Recorded, Recording
 from groundstation.rig.read import load_rig
 
@@ -116,9 +117,9 @@ def _bytes_to_state_ms(recording: Recording, vehicle: str) -> list[float]:
 
 def _frame_to_fix_ms(recording: Recording, vehicle: str, rig: Rig) -> list[float]:
     """A frame's arrival is its stamp, the middle of the exposure, plus the rig's delay."""
-    camera = rig.mock_up_of(vehicle).star_camera
+    camera = rig.of_type(vehicle, StarsOfType).star_camera
     assert camera is not None
-    delay_ns = round(camera.delay_s * 1e9)
+    delay_ns = round(camera.delay[0] * 1e9)
     begin_ns = recording.start_ns + round(WARM_UP_S * 1e9)
     ages_ms = []
     for message in _messages(recording, StarFix, vehicle):
