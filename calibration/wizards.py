@@ -83,7 +83,7 @@ def load_wizard(name: str) -> Wizard:
         raise UsageError(f"there is no guided calibration {name!r}; installed: {', '.join(sorted(found))}.")
     try:
         wizard: Wizard = found[name].load()
-    except Exception as error:  # whatever somebody's package raises while it is imported
+    except (Exception, SystemExit) as error:  # whatever somebody's package raises while it is imported
         raise UsageError(f"the guided calibration {name!r} cannot be loaded ({error}).") from error
     return wizard
 

@@ -52,7 +52,10 @@ def device_kinds() -> tuple[DeviceKind[Any], ...]:
         where = f"device {point.name!r} of the package {package} ({point.value})"
         try:
             kind = point.load()
-        except Exception as error:  # whatever a package of somebody else raises: it is named, once
+        except (
+            Exception,
+            SystemExit,
+        ) as error:  # whatever a package of somebody else raises: it is named, once
             raise NotFound(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
         if not isinstance(kind, DeviceKind):
             raise NotFound(f"{where} is a {type(kind).__name__}, no DeviceKind")

@@ -99,7 +99,7 @@ def load_laboratory(name: str, config: Mapping[str, object], seed: int) -> Labor
     point = offered[name]
     try:
         factory = point.load()
-    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+    except (Exception, SystemExit) as error:  # whatever a package of somebody else raises: it is named, once
         raise NotFound(
             f"laboratory {name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}"
         ) from error

@@ -21,8 +21,8 @@ from drivers.valve_bus.protocol import ARM_ID, COMMAND_ID, FLOAT_AIR_ID, STOP_ID
 _VEHICLE_BITS = 0x00F
 _STATION_IDS = frozenset((STOP_ID, ARM_ID, FLOAT_AIR_ID, COMMAND_ID))  # sent by the station, obeyed by nodes
 _SLICE_S = 0.1  # `frames` looks for a close this often
-_OPEN_ERRORS = (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError)
-"""Each back end of python-can raises its own kind when it cannot open; all mean that there is no bus."""
+# each back end of python-can raises its own kind when it cannot open: all mean that there is no bus
+_OPEN_ERRORS = (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError)  # no bus
 
 
 @dataclass(slots=True)

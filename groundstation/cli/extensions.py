@@ -40,7 +40,7 @@ def _load(point: EntryPoint) -> Row:
     where = f"the command '{point.name}' of {_package_of(point)}"
     try:
         found = point.load()
-    except Exception as error:  # whatever somebody's package raises while it is imported
+    except (Exception, SystemExit) as error:  # whatever somebody's package raises while it is imported
         raise BrokenCommandError(f"{where} cannot be loaded ({type(error).__name__}: {error}).") from error
     if not isinstance(found, Command | Group):
         raise BrokenCommandError(

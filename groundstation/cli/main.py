@@ -117,7 +117,7 @@ def _load(row: Command) -> typer.Typer | Callable[..., Any]:
     module, _, attribute = row.target.partition(":")
     try:
         found: typer.Typer | Callable[..., Any] = getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # whatever somebody's package raises while it is imported
+    except (Exception, SystemExit) as error:  # whatever somebody's package raises while it is imported
         if module.startswith("groundstation."):
             raise
         raise BrokenCommandError(f"{row.target} cannot be loaded ({error}).") from error

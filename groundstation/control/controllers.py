@@ -107,7 +107,7 @@ def _load(point: EntryPoint) -> ControllerRow[Any]:
     where = _where(point)
     try:
         row = point.load()
-    except Exception as error:  # whatever a package of somebody else raises: it is named, once
+    except (Exception, SystemExit) as error:  # whatever a package of somebody else raises: it is named, once
         raise ControllerError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(row, ControllerRow):
         raise ControllerError(f"{where} is a {type(row).__name__}, expected a ControllerRow")

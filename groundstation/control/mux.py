@@ -131,7 +131,7 @@ class CommandMux(Generic[Demand]):
     def _silence(self, stamp_ns: int) -> str:
         arrival_ns = self._arrival_ns.get(Source.CONTROLLER)
         if arrival_ns is None:
-            return "controller not heard yet"
+            return "nothing received from the controller yet"
         return f"controller silent for {_ms(stamp_ns - arrival_ns)} ms"
 
 

@@ -48,6 +48,9 @@ class PortThread(threading.Thread):
                 if not self._closing.is_set():
                     sentence = f"{self.port.channel}: {error}; next try in {self._wait_s:.1f} s"
                     self._trouble(self.port.channel, ERROR, sentence)
+            except SystemExit as error:  # a bug of an edge, which would end this thread unseen
+                self._crash(RuntimeError(f"{self.port.channel}: its edge asks to exit ({error})"))
+                return
             except Exception as error:  # a bug: the loop raises it, else the thread would die unseen
                 self._crash(error)
                 return

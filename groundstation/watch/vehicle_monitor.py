@@ -91,7 +91,7 @@ class VehicleMonitor:
             return otherwise
         try:
             return ask(*about)
-        except Exception as error:  # whatever a gauge of somebody else raises
+        except (Exception, SystemExit) as error:  # of somebody else: it is noted, the view goes on
             self._failed.add(gauge)
             self._note(f"{self.name}: {type(gauge).__name__} failed: {type(error).__name__}: {error}")
             return otherwise

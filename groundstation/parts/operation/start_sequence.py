@@ -65,7 +65,7 @@ class StartSequence(Node):
                 for name, value in (("guard", mode), ("valve node", valves), ("fusion", fusion))
                 if value is None
             ]
-            return "waiting", f"not heard yet: {', '.join(missing)}", ""
+            return "waiting", f"nothing received yet from {', '.join(missing)}", ""
         if mode.stopped:
             return "stopped", f"by {mode.source}", ""
         if not valves.floating:

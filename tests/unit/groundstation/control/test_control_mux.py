@@ -56,7 +56,7 @@ def test_silence_of_the_controller_brakes_for_closed_valves_mean_coasting(mux):
 
 def test_a_controller_that_never_spoke_brakes_too(mux):
     mux.receive_state(0)
-    assert mux.select(0).reason == "controller not heard yet"
+    assert mux.select(0).reason == "nothing received from the controller yet"
     assert mux.select(0).source is Source.BRAKE
 
 

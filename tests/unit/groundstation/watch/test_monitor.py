@@ -1,5 +1,7 @@
 """The monitor: cheap while messages stream, right when somebody looks, unharmed by what fails."""
 
+import sys
+
 import pytest
 
 from groundstation.declarations.part import Part
@@ -149,7 +151,7 @@ def test_garbled_messages_are_counted_and_reported_once_per_topic(tables, messag
 
 
 class Shared(Gauge):
-    """Reports the same of a message for each vehicle, and fails on the phase ``fail``."""
+    """Reports the same of a message for each vehicle, and fails on the phases ``fail`` and ``exit``."""
 
     label = "shared"
     every = (Diagnostics, SequencePhase)
@@ -158,6 +160,8 @@ class Shared(Gauge):
         yield f"{message.node} reports" if isinstance(message, Diagnostics) else "a phase"
         if getattr(message, "phase", "") == "fail":
             raise RuntimeError("no such phase")
+        if getattr(message, "phase", "") == "exit":
+            sys.exit("enough")
 
     def cell(self, newest, now_ns):
         return cell("fine")
@@ -176,10 +180,13 @@ def test_what_all_vehicles_report_of_one_message_is_one_event(shared, message, d
     assert shared.take_lines() == ["beta/x reports"]
 
 
-def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered):
+@pytest.mark.parametrize(
+    ("phase", "how"), [("fail", "RuntimeError: no such phase"), ("exit", "SystemExit: enough")]
+)
+def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered, phase, how):
     for number in range(3):
-        shared.take_delivered(delivered(message(SequencePhase, phase="fail"), number), 0)
-    assert shared.take_lines() == ["alpha: Shared failed: RuntimeError: no such phase"]
+        shared.take_delivered(delivered(message(SequencePhase, phase=phase), number), 0)
+    assert shared.take_lines() == [f"alpha: Shared failed: {how}"]
     assert row(shared, "shared") == "failed"
     assert row(shared, "shared", vehicle="beta") == "fine"
     shared.look(0)
