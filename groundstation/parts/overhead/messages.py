@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from groundstation.declarations.camera_image import CameraImage
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import (
     F64,
-    I64,
     PACKAGE,
     U16,
-    U32,
-    Bytes,
     Float64x3,
     Message,
     Text,
@@ -19,19 +17,9 @@ from groundstation.declarations.topic import Delivery, Rank, Recorded, Scope, To
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OverheadImage(Message):
-    """One colour picture of the camera over the table; the stamp is its arrival.
+class OverheadImage(CameraImage):
+    """One colour picture of the camera over the table; the stamp is its arrival."""
 
-    Attributes:
-        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not state it.
-        height: Rows.
-        width: Columns.
-        encoding: ``bgr8``.
-        step: Bytes of a row.
-        data: Row after row, the top one first.
-    """
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CameraImage"
     TOPIC: ClassVar = Topic(
         "overhead_image",
         10,
@@ -40,12 +28,6 @@ class OverheadImage(Message):
         delivery=Delivery.NEWEST,
         recorded=Recorded.IMAGES,
     )
-    device_stamp_ns: I64
-    height: U32
-    width: U32
-    encoding: Text
-    step: U32
-    data: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

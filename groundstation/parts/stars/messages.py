@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from groundstation.declarations.camera_image import CameraImage
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import (
     F64,
@@ -22,26 +23,10 @@ from groundstation.declarations.topic import Delivery, Rank, Recorded, Topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StarImage(Message):
-    """One grey picture of the star camera; the stamp is its arrival.
+class StarImage(CameraImage):
+    """One grey picture of the star camera; the stamp is its arrival."""
 
-    Attributes:
-        device_stamp_ns: When the camera's driver had it, on the same clock; 0 where it does not state it.
-        height: Rows.
-        width: Columns.
-        encoding: ``mono8``.
-        step: Bytes of a row.
-        data: Row after row, the top one first.
-    """
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CameraImage"
     TOPIC: ClassVar = Topic("star_image", 15, Rank.SENSOR, delivery=Delivery.NEWEST, recorded=Recorded.IMAGES)
-    device_stamp_ns: I64
-    height: U32
-    width: U32
-    encoding: Text
-    step: U32
-    data: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
