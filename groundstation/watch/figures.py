@@ -2,13 +2,14 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from groundstation.parts.control.gauges import station_errors
+from groundstation.parts.operation.messages import Latency
 from groundstation.parts.reference.gauges import estimate_errors
 from groundstation.watch.tracks import Track
 
@@ -140,26 +141,33 @@ def draw_latency(tracks: Mapping[str, Track], path: Path) -> None:
     """Age of the light at each stage of the chain from the exposure on, and of the bytes at the state."""
     figure = Figure(figsize=(10, 3.5), layout="constrained")
     axes = figure.add_subplot()
-    names = [name for name, track in tracks.items() if track.latency is not None]
-    stages: tuple[str, ...] = ()
-    width = 0.8 / max(1, len(names))
-    for index, (colour, name) in enumerate(zip(_cycle(), names, strict=False)):
-        latency = tracks[name].latency
-        assert latency is not None
-        stages = latency.stages
-        place = np.arange(len(stages)) + (index - (len(names) - 1) / 2) * width
-        low = np.nan_to_num(np.array(latency.p50_s)) * 1e3
-        high = np.nan_to_num(np.array(latency.p99_s)) * 1e3
+    found = {name: track.latency for name, track in tracks.items() if track.latency is not None}
+    shown = reached_stages(found.values())
+    width = 0.8 / max(1, len(found))
+    for index, (colour, (name, latency)) in enumerate(zip(_cycle(), found.items(), strict=False)):
+        place = np.arange(len(shown)) + (index - (len(found) - 1) / 2) * width
+        low, high = (
+            1e3 * np.array([dict(zip(latency.stages, ages_s, strict=True))[stage] for stage in shown])
+            for ages_s in (latency.p50_s, latency.p99_s)
+        )
         axes.bar(place, low, width, color=colour, label=f"{name}, median")
         axes.vlines(place, low, high, color="black", lw=1)
         axes.plot(place, high, "_", color="black", ms=8)
-    axes.set_xticks(range(len(stages)), [stage.replace("_", " ") for stage in stages])
+    axes.set_xticks(range(len(shown)), [stage.replace("_", " ") for stage in shown])
     axes.set_ylabel("age, ms")
     axes.set_title("Age of the light at each stage (line: 99th percentile); last: bytes arrived to state")
     axes.grid(axis="y", alpha=0.3)
-    if names:
+    if found:
         axes.legend()
     figure.savefig(path, dpi=DPI)
+
+
+def reached_stages(latencies: Iterable[Latency]) -> list[str]:
+    """Stages at which any vehicle has an age: drawn fixes pass no picture, and no bar is no age of 0."""
+    ages_s = [dict(zip(latency.stages, latency.p50_s, strict=True)) for latency in latencies]
+    return [
+        stage for stage in (ages_s[0] if ages_s else ()) if any(np.isfinite(row[stage]) for row in ages_s)
+    ]
 
 
 def _cycle() -> tuple[str, ...]:

@@ -12,7 +12,14 @@ from groundstation.parts.operation.messages import Diagnostics, Latency, Sequenc
 from groundstation.parts.overhead.messages import FixComparison
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.valves.messages import ValveCommand
-from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
+from groundstation.watch.figures import (
+    draw_errors,
+    draw_fixes,
+    draw_latency,
+    draw_table,
+    draw_valves,
+    reached_stages,
+)
 from groundstation.watch.ledger import STAGES
 from groundstation.watch.summary import summarise, wanted
 
@@ -141,3 +148,12 @@ def test_the_track_is_made_of_its_messages(report):
     assert np.ptp(track.truth[:, 3]) == 0.0
     assert track.latency is not None
     assert track.latency.p50_s[1] == 0.01  # the newest
+
+
+def test_a_stage_that_no_light_reached_is_left_out_of_the_figure_and_not_drawn_as_0():
+    nan = math.nan
+    drawn = Latency(0, "alpha", ("exposure", "spots", "fix"), (0.0, nan, 0.6), (0.0, nan, 0.7))
+    seen = Latency(0, "beta", ("exposure", "spots", "fix"), (0.0, 0.02, 0.03), (0.0, 0.03, 0.05))
+    assert reached_stages([drawn]) == ["exposure", "fix"]
+    assert reached_stages([drawn, seen]) == ["exposure", "spots", "fix"]
+    assert reached_stages([]) == []
