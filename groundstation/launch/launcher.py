@@ -20,11 +20,12 @@ from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
 from groundstation.declarations.node import COMMANDS
-from groundstation.declarations.rig import Rig
+from groundstation.declarations.rig import STATION, Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
 from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.forking import share_one_arena
+from groundstation.launch.memory import forget, memory_folder
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.rig.plan import RECORDER, processes_of
@@ -78,6 +79,7 @@ class Launcher:
         self._fork_server = ForkServer(("groundstation.launch.preload",))
         self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
+        self._memory = memory_folder(rig_path)
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
@@ -230,11 +232,12 @@ class Launcher:
         for name in sorted(self._waiting):
             child = self._children[name]
             child.started_s = self._time.now_s
-            child.write(pickle.dumps(Go(dict(self._addresses))))
+            child.write(pickle.dumps(Go({**self._addresses, f"{STATION}memory": str(self._memory)})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
         self._addresses = None
+        forget(self._memory)
         laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
 
     def close(self) -> None:

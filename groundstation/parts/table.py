@@ -43,9 +43,10 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
     from groundstation.parts.stars.part import PART as STARS
+    from groundstation.parts.supervision.part import PART as SUPERVISION
     from groundstation.parts.valves.part import PART as VALVES
 
-    return VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
+    return SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
 
 
 def _load(point: EntryPoint) -> Part:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.node import COMMANDS, Node, NodeRow, Weight
 from groundstation.declarations.port import Port
-from groundstation.declarations.rig import LABORATORY, Rig
+from groundstation.declarations.rig import LABORATORY, STATION, Rig
 
 RECORDER = "recorder"
 NOT_VEHICLES = frozenset({"rig", "record", "alive"})
@@ -120,6 +120,8 @@ def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
     found = []
     for port, _ in ports_of(rig):
         address = port.address
+        if isinstance(address, str) and address.startswith(STATION):
+            continue
         if not isinstance(address, str) or not address.startswith(LABORATORY):
             raise RigError(f"{port.channel}: {address!r} is real hardware, which runs in real time only")
         channel = address.removeprefix(LABORATORY)
@@ -141,7 +143,9 @@ def resolved_ports(rig: Rig, process: str, addresses: Mapping[str, object]) -> l
         if home != process:
             continue
         address = port.address
-        if isinstance(address, str) and address.startswith(LABORATORY):
+        if isinstance(address, str) and address.startswith(STATION):
+            address = addresses[address]
+        elif isinstance(address, str) and address.startswith(LABORATORY):
             channel = address.removeprefix(LABORATORY)
             if port.is_optional and channel not in addresses:
                 continue

@@ -177,7 +177,7 @@ FAULTS: Mapping[str, Fault] = {
               ((0.0, _CUT),), _PERSON, False, False, "Put them apart."),
         # -- who looks after it ---------------------------------------------------------------------
         Fault("controller_silent", "No demand comes from the controller.",
-              "the multiplexer brakes by itself for 0.5 s", 1.0,
+              "no demand for 0.5 s", 1.0,
               ((0.0, _HOLD), (5.0, _LAND)), _ITSELF, False, False,
               "See whether the controller's process is started again."),
         Fault("detector_silent", "Nothing comes from the fault detector.", "no findings for 0.5 s", 1.0,

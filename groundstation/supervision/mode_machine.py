@@ -37,6 +37,7 @@ class Memory:
         mode: The mode.
         is_stop_latched: A person pressed stop and nobody has released it.
         is_flight_wanted: It takes off by itself as soon as it may.
+        then: What braking leads to.
         cause: Of the mode.
         author: Who asked for it; empty for the station itself.
         since_ns: When the mode began, host monotonic clock.
@@ -45,6 +46,7 @@ class Memory:
     mode: Mode
     is_stop_latched: bool
     is_flight_wanted: bool
+    then: Then
     cause: str
     author: str
     since_ns: int
@@ -60,8 +62,7 @@ class ModeMachine:
 
     def __init__(self, now_ns: int, *, starts_by_itself: bool) -> None:
         mode = Mode.RESTING if starts_by_itself else Mode.LANDED
-        self.memory = Memory(mode, False, starts_by_itself, "it has just begun", "", now_ns)
-        self.then = Then.FLY
+        self.memory = Memory(mode, False, starts_by_itself, Then.FLY, "it has just begun", "", now_ns)
         self.wants_air = False
         self._pressed_ns: int | None = None
         self._presses: deque[tuple[str, int]] = deque(maxlen=_PRESSES)
@@ -71,21 +72,23 @@ class ModeMachine:
         """The mode."""
         return self.memory.mode
 
+    @property
+    def then(self) -> Then:
+        """What braking leads to."""
+        return self.memory.then
+
     def recall(self, memory: Memory, now_ns: int) -> None:
         """Take up what was kept on disk before a restart.
 
         A vehicle that may be moving brakes, where its braking was not meant to end in a landing; what was
         about to land lands. Who had stopped it stays its author.
         """
-        before, then = memory.mode, Then.FLY
-        if before in (Mode.FLYING, Mode.BRAKING, Mode.HOLDING):
-            mode = Mode.LANDING if memory.is_stop_latched else Mode.BRAKING
-            then = Then.FLY if memory.is_flight_wanted else Then.LAND
-        elif before in GROUNDED:
+        before = memory.mode
+        if before in GROUNDED:
             mode = before
         else:
-            mode = Mode.LANDING
-        self.then = then
+            brakes = before in BRAKEABLE and memory.then is not Then.LAND
+            mode = Mode.BRAKING if brakes else Mode.LANDING
         self.wants_air = mode is Mode.BRAKING
         cause = memory.cause if mode is before else f"started again while {before}: {memory.cause}"
         self.memory = replace(memory, mode=mode, cause=cause, since_ns=now_ns)
@@ -148,7 +151,7 @@ class ModeMachine:
 
     def _note(self, event: Event) -> None:
         """Note what the event latches, wants, and what braking then leads to."""
-        wanted, latched = self.memory.is_flight_wanted, self.memory.is_stop_latched
+        wanted, latched, then = self.memory.is_flight_wanted, self.memory.is_stop_latched, self.memory.then
         match event:
             case Event.FLY:
                 wanted = True
@@ -159,20 +162,20 @@ class ModeMachine:
             case Event.ARM:
                 wanted = False
             case Event.STOP | Event.STOP_AGAIN:
-                wanted, latched, self.then = False, True, Then.LAND
+                wanted, latched, then = False, True, Then.LAND
             case Event.LAND | Event.DISARM | Event.FLOAT_OFF:
                 wanted, self.wants_air = False, False
             case Event.RELEASE:
                 wanted, latched, self._pressed_ns = False, False, None
             case Event.BRAKE:
-                self.then = max(self.then, Then.HOLD)
+                then = max(then, Then.HOLD)
             case Event.FAULT_LANDS:
-                self.then = Then.LAND
+                then = Then.LAND
             case Event.FAULT_HOLDS | Event.RESUME | Event.AIR_IS_ON:
-                self.then = Then.FLY
+                then = Then.FLY
             case Event.AIR_IS_OFF | Event.NODE_SILENT:
                 self.wants_air = False
-        self.memory = replace(self.memory, is_flight_wanted=wanted, is_stop_latched=latched)
+        self.memory = replace(self.memory, is_flight_wanted=wanted, is_stop_latched=latched, then=then)
 
     def give_up_flight(self) -> None:
         """Flight is wanted no longer: what brought it down is for a person to clear."""

@@ -113,9 +113,8 @@ class Event(StrEnum):
 
 
 class Who(StrEnum):
-    """Who may ask for a transition."""
+    """Whose a transition is."""
 
-    ANYONE = "anyone"
     PERSON = "a person"
     STATION = "the station itself"
 
@@ -128,7 +127,7 @@ class Transition:
         event: What happens.
         before: Modes in which it counts.
         after: The mode that follows.
-        who: Who may ask for it.
+        who: A person may ask for it, or the station decides it alone.
         cause: For people.
         is_gated: Every check of the arming gate must pass.
     """
@@ -156,10 +155,10 @@ ALOFT = (Mode.FLOATING, Mode.ARMED, *BRAKEABLE)
 
 _M, _E, _W = Mode, Event, Who
 TRANSITIONS: tuple[Transition, ...] = (
-    _row(_E.FLY, (_M.LANDED, _M.RESTING), _M.RESTING, _W.ANYONE, "flight is wanted"),
+    _row(_E.FLY, (_M.LANDED, _M.RESTING), _M.RESTING, _W.PERSON, "flight is wanted"),
     _row(_E.READY, (_M.RESTING,), _M.ARMED, _W.STATION, "every check passed", is_gated=True),
-    _row(_E.ARM, (_M.LANDED, _M.RESTING), _M.ARMED, _W.PERSON, "armed by request", is_gated=True),
-    _row(_E.ARM, (_M.FLOATING,), _M.FLYING, _W.PERSON, "armed by request", is_gated=True),
+    _row(_E.ARM, (_M.LANDED, _M.RESTING, _M.FLOATING), _M.ARMED, _W.PERSON, "armed by request",
+         is_gated=True),
     _row(_E.FLOAT_ON, (_M.LANDED, _M.RESTING), _M.FLOATING, _W.PERSON, "floats by request, unarmed"),
     _row(_E.FLOAT_ON, (_M.FLOATING,), _M.FLOATING, _W.PERSON, "floats by request, unarmed"),
     _row(_E.FLOAT_ON, (_M.ARMED,), _M.ARMED, _W.PERSON, "floats by request"),
@@ -175,20 +174,20 @@ TRANSITIONS: tuple[Transition, ...] = (
     _row(_E.FAULTS_GONE, (_M.BRAKING, _M.HOLDING), _M.FLYING, _W.STATION, "the fault is gone"),
     _row(_E.AT_REST, (_M.BRAKING,), _M.HOLDING, _W.STATION, "it is at rest"),
     _row(_E.HELD, (_M.BRAKING, _M.HOLDING), _M.LANDING, _W.STATION, "braked and held"),
-    _row(_E.STOP, BRAKEABLE, _M.BRAKING, _W.ANYONE, "stopped: brakes, holds, lands"),
-    _row(_E.STOP, (_M.FLOATING, _M.ARMED, _M.LANDING, _M.LOST), _M.LANDING, _W.ANYONE, "stopped: lands"),
-    _row(_E.STOP, GROUNDED, _M.STOPPED, _W.ANYONE, "stopped on the ground"),
-    _row(_E.STOP_AGAIN, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.ANYONE, "stopped twice: air cut"),
-    _row(_E.STOP_AGAIN, GROUNDED, _M.STOPPED, _W.ANYONE, "stopped on the ground"),
-    _row(_E.LAND, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.ANYONE, "landed by request"),
-    _row(_E.LAND, (_M.LANDED, _M.RESTING), _M.LANDED, _W.ANYONE, "landed by request"),
-    _row(_E.LAND, (_M.STOPPED,), _M.STOPPED, _W.ANYONE, "stopped"),
-    _row(_E.DISARM, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.ANYONE, "disarmed by request"),
-    _row(_E.DISARM, (_M.LANDED, _M.RESTING), _M.LANDED, _W.ANYONE, "disarmed by request"),
-    _row(_E.DISARM, (_M.STOPPED,), _M.STOPPED, _W.ANYONE, "stopped"),
-    _row(_E.FLOAT_OFF, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.ANYONE, "float air cut by request"),
-    _row(_E.FLOAT_OFF, (_M.LANDED, _M.RESTING), _M.LANDED, _W.ANYONE, "float air cut by request"),
-    _row(_E.FLOAT_OFF, (_M.STOPPED,), _M.STOPPED, _W.ANYONE, "stopped"),
+    _row(_E.STOP, BRAKEABLE, _M.BRAKING, _W.PERSON, "stopped: brakes, holds, lands"),
+    _row(_E.STOP, (_M.FLOATING, _M.ARMED, _M.LANDING, _M.LOST), _M.LANDING, _W.PERSON, "stopped: lands"),
+    _row(_E.STOP, GROUNDED, _M.STOPPED, _W.PERSON, "stopped on the ground"),
+    _row(_E.STOP_AGAIN, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.PERSON, "stopped twice: air cut"),
+    _row(_E.STOP_AGAIN, GROUNDED, _M.STOPPED, _W.PERSON, "stopped on the ground"),
+    _row(_E.LAND, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.PERSON, "landed by request"),
+    _row(_E.LAND, (_M.LANDED, _M.RESTING), _M.LANDED, _W.PERSON, "landed by request"),
+    _row(_E.LAND, (_M.STOPPED,), _M.STOPPED, _W.PERSON, "stopped"),
+    _row(_E.DISARM, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.PERSON, "disarmed by request"),
+    _row(_E.DISARM, (_M.LANDED, _M.RESTING), _M.LANDED, _W.PERSON, "disarmed by request"),
+    _row(_E.DISARM, (_M.STOPPED,), _M.STOPPED, _W.PERSON, "stopped"),
+    _row(_E.FLOAT_OFF, (*ALOFT, _M.LANDING, _M.LOST), _M.LANDING, _W.PERSON, "float air cut by request"),
+    _row(_E.FLOAT_OFF, (_M.LANDED, _M.RESTING), _M.LANDED, _W.PERSON, "float air cut by request"),
+    _row(_E.FLOAT_OFF, (_M.STOPPED,), _M.STOPPED, _W.PERSON, "stopped"),
     _row(_E.AIR_IS_OFF, (_M.LANDING,), _M.LANDED, _W.STATION, "its valve node reports that it is down"),
     _row(_E.NODE_SILENT, (*ALOFT, _M.LANDING), _M.LOST, _W.STATION, "nothing comes from the valve node"),
     _row(_E.NODE_BACK, (_M.LOST,), _M.LANDING, _W.STATION, "the valve node reports again"),

@@ -81,7 +81,7 @@ class Sightings:
         rest_s: Length of its unbroken rest.
         recorder_ns: Arrival of the recorder's newest status; None where none was ever received.
         recorder_room_s: How long the recording can go on by the room on its disk.
-        braking_since_ns: Since when the multiplexer has braked for want of a controller; None where not.
+        demand_ns: Arrival of the controller's newest demand; None where none was ever received.
         tick_ns: When the supervisor looked last.
         late_s: How late it looked now.
     """
@@ -100,7 +100,7 @@ class Sightings:
     rest_s: float = 0.0
     recorder_ns: int | None = None
     recorder_room_s: float = math.inf
-    braking_since_ns: int | None = None
+    demand_ns: int | None = None
     tick_ns: int | None = None
     late_s: float = 0.0
 
@@ -228,9 +228,9 @@ class Sightings:
                 yield "node_disobeys", "it reports that it is disarmed"
             elif node.dead_man:
                 yield "node_disobeys", "its dead man has closed the valves"
-        since_ns = self.braking_since_ns
-        if since_ns is not None and now_ns - since_ns > CONTROLLER_S * NS_PER_S:
-            yield "controller_silent", f"for {(now_ns - since_ns) / NS_PER_S:.1f} s"
+        if may_open and not self.is_state_silent(now_ns):  # without a state no controller works
+            if self.is_silent(self.demand_ns, CONTROLLER_S, now_ns):
+                yield "controller_silent", _age("demand", self.demand_ns, now_ns)
 
 
 def _age(what: str, arrival_ns: int | None, now_ns: int) -> str:

@@ -136,8 +136,9 @@ class Supervisor:
         if node is None:
             return
         if not node.floating:
-            self._air_since_ns = None
-            machine.apply(Event.AIR_IS_OFF, now_ns)
+            was_on, self._air_since_ns = self._air_since_ns is not None, None
+            if was_on or self.mode is not Mode.FLOATING:  # there the order may still be on its way
+                machine.apply(Event.AIR_IS_OFF, now_ns)
         elif self._air_since_ns is None:
             self._air_since_ns = now_ns
         if self._air_since_ns is not None and now_ns - self._air_since_ns >= LIFT_S * 1e9:

@@ -9,7 +9,6 @@ import numpy as np
 from groundstation.declarations.fix import Floor, PoseFix
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
 from groundstation.fusion.estimator import WAITS, Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
@@ -17,6 +16,7 @@ from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 
 STATUS_PERIOD_NS = 200_000_000
@@ -41,7 +41,7 @@ class Fusion(Node):
         stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
-    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Request)
+    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Supervision)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
@@ -55,7 +55,7 @@ class Fusion(Node):
         stand_in: ForceStandIn | None = None,
     ) -> None:
         super().__init__(vehicle, STATUS_PERIOD_NS)
-        self.inputs = (Imu, *payloads.values(), ValveStatus, ValveCommand, Request)
+        self.inputs = (Imu, *payloads.values(), ValveStatus, ValveCommand, Supervision)
         self._sources = {payload: name for name, payload in payloads.items()}
         self._estimator = estimator
         self._method = method
@@ -69,6 +69,7 @@ class Fusion(Node):
         self._rest_since_ns: int | None = None
         self._rest_ns = 0
         self._float_ordered_ns = -ORDER_HOLDS_NS
+        self._is_air_ordered = False
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
@@ -90,9 +91,11 @@ class Fusion(Node):
                     self._receive_float(now_ns, floating=message.floating)
             case ValveCommand() if self._stand_in is not None:
                 self._stand_in.receive(message, now_ns)
-            case Request(action="float_on"):
-                self._float_ordered_ns = now_ns
-                self._receive_float(now_ns, floating=True)
+            case Supervision():
+                if message.air_on and not self._is_air_ordered:
+                    self._float_ordered_ns = now_ns
+                    self._receive_float(now_ns, floating=True)
+                self._is_air_ordered = message.air_on
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         yield from self._overdue(now_ns)

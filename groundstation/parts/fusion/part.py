@@ -9,12 +9,12 @@ from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator
 from groundstation.fusion.estimators import ESTIMATORS
-from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
+from groundstation.parts.fusion.estimation import calibration_texts, floors_of, noise_of
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.fusion import NO_FILES, Fusion
 from groundstation.parts.fusion.gauges import FIGURES, GAUGES
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
-from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle
+from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle, fused_sources
 
 
 def _fusion(rig: Rig, vehicle: str) -> Node:

@@ -4,6 +4,8 @@ from typing import Self
 
 from pydantic import model_validator
 
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Positive, Section
 from groundstation.fusion.estimators import ESTIMATORS
 
@@ -31,3 +33,17 @@ class FusionOfVehicle(Section):
     """Keys of a vehicle: whose fixes its estimator takes; the first source that it has, if none is named."""
 
     fix_sources: tuple[str, ...] = ()
+
+
+def fused_sources(rig: Rig, vehicle: str) -> tuple[str, ...]:
+    """Return whose fixes a vehicle's estimator takes: those named, else the first source that it has."""
+    named = rig.vehicle(vehicle, FusionOfVehicle).fix_sources
+    if named:
+        return named
+    every = rig.tables.fix_sources.values()
+    return tuple(source.name for source in every if source.condition(rig, vehicle))[:1]
+
+
+def fix_payloads(rig: Rig, vehicle: str) -> tuple[type[PoseFix], ...]:
+    """Return the classes of the fixes that a vehicle's estimator takes."""
+    return tuple(rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle))

@@ -1,0 +1,55 @@
+"""Whether fixes come, and whether they come from pictures that are new. Pure."""
+
+from collections import deque
+from collections.abc import Iterator
+from statistics import median
+
+SHORTEST_OUTAGE_S = 0.5
+PERIODS = 3.0
+LASTING_S = 1.0
+REFUSED_IN_A_ROW = 8
+REPEATS, TORN = "repeats", "torn"
+"""What the reasons of pictures and fixes hold."""
+
+
+class FixWatch:
+    """Follows fixes and what became of them."""
+
+    def __init__(self) -> None:
+        self._used_ns: int | None = None
+        self._intervals_s: deque[float] = deque(maxlen=9)
+        self._refused = 0
+        self._marks: dict[str, tuple[int, str]] = {}
+
+    def take_account(self, now_ns: int, *, is_used: bool, reason: str) -> None:
+        """Account for what fusion did with a fix."""
+        if is_used:
+            if self._used_ns is not None:
+                self._intervals_s.append((now_ns - self._used_ns) * 1e-9)
+            self._used_ns = now_ns
+            self._refused = 0
+        elif REPEATS in reason:
+            self._marks["camera_frozen"] = now_ns, reason
+        else:
+            self._refused += 1
+            if self._refused >= REFUSED_IN_A_ROW:
+                self._marks["wrong_fixes"] = now_ns, f"{self._refused} refused in a row: {reason}"
+
+    def take_picture(self, now_ns: int, reason: str) -> None:
+        """Account for a picture without a fix."""
+        if REPEATS in reason:
+            self._marks["camera_frozen"] = now_ns, reason
+        elif TORN in reason:
+            self._marks["camera_torn"] = now_ns, reason
+
+    def findings(self, now_ns: int) -> Iterator[tuple[str, str]]:
+        """Faults at this moment, by id with details; no outage before the first fix was used."""
+        for fault, (seen_ns, detail) in self._marks.items():
+            if now_ns - seen_ns < LASTING_S * 1e9:
+                yield fault, detail
+        if self._used_ns is None:
+            return
+        usual_s = median(self._intervals_s) if self._intervals_s else 0.0
+        age_s = (now_ns - self._used_ns) * 1e-9
+        if age_s > max(SHORTEST_OUTAGE_S, PERIODS * usual_s):
+            yield "star_outage", f"no fix for {age_s:.1f} s"
