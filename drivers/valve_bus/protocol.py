@@ -91,6 +91,8 @@ def encode(message: ValveBusMessage) -> CanFrame:
         data = database().get_message_by_frame_id(base_id).encode(signals)
     except (EncodeError, OverflowError) as error:
         raise ValueError(f"{type(message).__name__} does not fit its frame: {error}") from error
+    if isinstance(message, Stop) and message.grace_s == 0.0:
+        data = data[:1]  # no grace is no second byte, as before there was one
     return CanFrame(base_id + message.vehicle, data)
 
 
