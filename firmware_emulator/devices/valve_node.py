@@ -1,7 +1,8 @@
 """The CAN node of one vehicle: commands to coil currents, and what it reports about itself.
 
-A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man, silence
-of 100 ms closes all, a stop closes all and disarms (`docs/interfaces/valve_bus.md`).
+A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man. Silence
+of 100 ms closes all; silence of 1 s, or a stop whose grace is over, closes all, cuts the float air and
+disarms (`docs/interfaces/valve_bus.md`).
 """
 
 from collections import deque
@@ -14,6 +15,7 @@ from drivers.valve_bus.protocol import (
     ARM_KEY,
     EVERY_VEHICLE,
     SILENCE_CLOSES_S,
+    SILENCE_LANDS_S,
     Arm,
     CanFrame,
     FloatAir,
@@ -34,6 +36,7 @@ STATUS_NS = 20_000_000
 SLOW_NS = 200_000_000  # pressure and heartbeat
 FIRMWARE = (1, 0)
 _SILENCE_NS = round(SILENCE_CLOSES_S * NS_PER_S)
+_LANDS_NS = round(SILENCE_LANDS_S * NS_PER_S)
 _MS = 1_000_000
 _TANK_NOISE_PA = 20e3
 _SUPPLY_NOISE_PA = 500.0
@@ -73,20 +76,23 @@ class ValveNode:
         self._encode_status: Callable[[ValveStatus], CanFrame] = lru_cache(256)(encode)
         self._off_ns: dict[int, int] = {}  # energised valves and when their time is up
         self._dead_man_ns = FAR_FUTURE_NS
+        self._lands_ns = start_ns + _LANDS_NS  # when the silence is too long; far while it is
+        self._stops_ns = FAR_FUTURE_NS  # when the grace of a pending stop is over
         # Nodes do not power up at the same moment: their cycles are spread over the bus.
         self._status_ns = start_ns + STATUS_NS + index * 1_300_000
         self._slow_ns = start_ns + SLOW_NS + index * 1_300_000 + 600_000
         failures.watch("valves", self._set_valve_failures)
-        self._is_armed = self._is_stopped = self._is_dead_man_closed = False
+        self._is_armed = self._is_stopped = self._is_dead_man_closed = self._is_landed_by_silence = False
         self._is_air_on = vehicle.is_floating
         self._last_counter: int | None = None
+        self._received_counter: int | None = None  # of any command, obeyed or not
         self._last_pulse_id: int | None = None
         self._rejected = self._status_counter = 0
 
     @property
     def next_ns(self) -> int:
         """Moment of the next thing it does."""
-        next_ns = min(self.next_output_ns, self._dead_man_ns)
+        next_ns = min(self.next_output_ns, self._dead_man_ns, self._lands_ns, self._stops_ns)
         if self._off_ns:
             next_ns = min(next_ns, *self._off_ns.values())
         if self._inbox:
@@ -110,6 +116,12 @@ class ValveNode:
             self._dead_man_ns = FAR_FUTURE_NS
             self._is_dead_man_closed = True
             self._close(list(self._off_ns), now_ns)
+        if self._lands_ns <= now_ns:
+            self._lands_ns = FAR_FUTURE_NS
+            self._is_landed_by_silence = self._is_armed or self._is_air_on
+            self._land(now_ns)
+        if self._stops_ns <= now_ns:
+            self._finish_stop(now_ns)
         is_silent = self._failures.active("silent_bus", now_ns - self._start_ns) is not None
         while self._inbox and self._inbox[0][0] <= now_ns:
             _, frame = self._inbox.popleft()
@@ -123,25 +135,65 @@ class ValveNode:
             case ValveCommand(vehicle=self._index):
                 self._command(message, now_ns)
             case Stop(vehicle=vehicle) if vehicle in (self._index, EVERY_VEHICLE):
-                self._close(list(self._off_ns), now_ns)
-                self._is_armed, self._is_stopped = False, True
-                self._dead_man_ns = FAR_FUTURE_NS
+                self._stop(message.grace_s, now_ns)
             case Arm(vehicle=self._index, key=key) if key == ARM_KEY:
                 self._arm(message.is_armed, now_ns)
             case FloatAir(vehicle=self._index):
-                self._vehicle.advance(now_ns)
-                self._vehicle.set_air(now_ns, message.is_on, self._float_delay_s)
-                self._is_air_on = message.is_on
+                self._float(message.is_on, now_ns)
+
+    @property
+    def _may_rise(self) -> bool:
+        """Whether the air may come on, or the node be armed."""
+        is_silent = self._lands_ns == FAR_FUTURE_NS
+        return not is_silent and self._stops_ns == FAR_FUTURE_NS
+
+    def _stop(self, grace_s: float, now_ns: int) -> None:
+        if self._is_stopped:
+            return
+        # A later frame may shorten what is left, never lengthen it.
+        self._stops_ns = min(self._stops_ns, now_ns + round(grace_s * NS_PER_S))
+        if self._stops_ns <= now_ns:
+            self._finish_stop(now_ns)
+
+    def _finish_stop(self, now_ns: int) -> None:
+        self._stops_ns = FAR_FUTURE_NS
+        self._is_stopped = True
+        self._land(now_ns)
+
+    def _land(self, now_ns: int) -> None:
+        """Close all valves, cut the float air, disarm."""
+        self._close(list(self._off_ns), now_ns)
+        self._is_armed = False
+        self._dead_man_ns = FAR_FUTURE_NS
+        self._switch_air(now_ns, is_on=False)
+
+    def _float(self, is_on: bool, now_ns: int) -> None:
+        if is_on:
+            if self._is_stopped or not self._may_rise:
+                return
+            self._is_landed_by_silence = False
+        self._switch_air(now_ns, is_on=is_on)
+
+    def _switch_air(self, now_ns: int, *, is_on: bool) -> None:
+        self._vehicle.advance(now_ns)
+        self._vehicle.set_air(now_ns, is_on, self._float_delay_s)
+        self._is_air_on = is_on
 
     def _arm(self, is_armed: bool, now_ns: int) -> None:
+        if is_armed and not self._may_rise:
+            return
         if is_armed and not self._is_armed:
             self._last_pulse_id = self._last_counter = None
         if not is_armed:
             self._close(list(self._off_ns), now_ns)
             self._dead_man_ns = FAR_FUTURE_NS
         self._is_armed, self._is_stopped, self._is_dead_man_closed = is_armed, False, False
+        self._is_landed_by_silence = False
 
     def _command(self, command: ValveCommand, now_ns: int) -> None:
+        if command.counter != self._received_counter:
+            self._received_counter = command.counter
+            self._lands_ns = now_ns + _LANDS_NS
         if not self._is_armed or command.counter == self._last_counter:
             self._rejected += 1
             return
@@ -208,6 +260,8 @@ class ValveNode:
                 is_stopped=self._is_stopped,
                 is_float_air_on=self._is_air_on,
                 rejected_commands=self._rejected & 0xFF,
+                is_stop_pending=self._stops_ns != FAR_FUTURE_NS,
+                is_landed_by_silence=self._is_landed_by_silence,
             )
         )
 

@@ -129,10 +129,22 @@ def test_the_other_valves_make_up_for_one_that_fails(fly, kind):
 
 
 def test_a_silent_bus_closes_the_valves_and_flight_goes_on_when_it_speaks_again(fly):
-    flight = fly(fault("silent_bus")).run(STOP_S)
-    assert not flight.of(ValveStatus, start_s=FAULT_S + 0.1, stop_s=END_S)
-    first = flight.of(ValveStatus, start_s=END_S)[0]
+    end_s = FAULT_S + 0.9
+    flight = fly(fault("silent_bus").replace(f"end_s = {END_S}", f"end_s = {end_s}")).run(STOP_S)
+    assert not flight.of(ValveStatus, start_s=FAULT_S + 0.1, stop_s=end_s)
+    first = flight.of(ValveStatus, start_s=end_s)[0]
     assert first.dead_man
     assert first.open_mask == 0
-    assert flight.of(ValveStatus)[-1].armed
+    assert first.armed
+    assert first.floating
     assert_survived(flight)
+
+
+def test_a_bus_that_is_silent_for_more_than_a_second_lands_the_vehicle_without_the_station(fly):
+    flight = fly(fault("silent_bus")).run(END_S + 0.1)
+    first = flight.of(ValveStatus, start_s=END_S)[0]
+    assert (first.floating, first.armed, first.open_mask) == (False, False, 0)
+    # the bearings set down 0.2 s after their air is cut, and friction stops the rest
+    truth = flight.of(ReferenceState, start_s=FAULT_S + 1.25, stop_s=END_S)
+    assert max(np.hypot(*row.velocity_table_m_s) for row in truth) == 0.0
+    assert truth[0].position_table_m == truth[-1].position_table_m

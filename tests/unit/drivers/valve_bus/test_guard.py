@@ -198,6 +198,101 @@ def test_a_released_stop_leaves_the_guard_disarmed(flying):
     assert flying.tick().open_mask == 1
 
 
+def test_an_announced_stop_lets_commands_pass_until_its_grace_is_over(flying):
+    start_ms = flying.now_ms
+    flying.guard.announce_stop(start_ms * MS, 0.5)
+    assert flying.guard.is_stop_announced
+    assert flying.guard.stop_reason is None
+    while flying.now_ms < start_ms + 480:
+        flying.say(ONE)
+        output = flying.tick()
+        left_s = (start_ms + 500 - flying.now_ms) / 1000
+        assert output.messages[0] == Stop(1, StopReason.OPERATOR, left_s)
+        assert output.messages[-1] is output.command
+        assert (output.gate, output.open_mask, output.command.on_times_ms) == (Gate.OPEN, 1, ONE)
+        flying.now_ms += 20
+    flying.say(ONE)
+    flying.tick()
+    ns = (start_ms + 500) * MS
+    assert flying.guard.tick(ns - 1).gate is Gate.OPEN
+    assert flying.guard.is_armed
+    last = flying.guard.tick(ns)
+    assert last.messages == (Stop(1, StopReason.OPERATOR), last.command)
+    assert (last.gate, last.open_mask, last.command.on_times_ms) == (Gate.STOPPED, 0, CLOSED)
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert not flying.guard.is_armed
+    assert not flying.guard.is_stop_announced
+    assert flying.guard.counters.stops == 1
+
+
+def test_the_grace_of_a_stop_ends_for_whoever_asks_first(flying):
+    flying.guard.announce_stop(0, 0.1)
+    flying.now_ms = 100
+    flying.say(ONE)  # not a tick
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert flying.tick().open_mask == 0
+
+
+@pytest.mark.parametrize(
+    ("second_s", "over_ms"), [(5.0, 1000), (0.81, 1000), (0.8, 1000), (0.79, 990), (0.1, 300)]
+)
+def test_a_second_announcement_shortens_the_grace_and_never_lengthens_it(flying, second_s, over_ms):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.announce_stop(200 * MS, second_s)
+    assert flying.guard.tick(over_ms * MS - 1).messages[0] == Stop(1, StopReason.OPERATOR, 1e-9)
+    assert flying.guard.tick(over_ms * MS).gate is Gate.STOPPED
+
+
+@pytest.mark.parametrize("grace_s", [0.0, -1.0, float("nan")])
+def test_an_announcement_without_grace_stops_at_once(flying, grace_s):
+    flying.guard.announce_stop(0, grace_s)
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert flying.tick().messages[0] == Stop(1, StopReason.OPERATOR)
+
+
+def test_a_grace_is_at_most_what_the_frame_carries(flying):
+    flying.guard.announce_stop(0, float("inf"))
+    assert flying.guard.tick(0).messages[0] == Stop(1, StopReason.OPERATOR, 25.5)
+
+
+def test_nobody_arms_while_a_stop_is_announced(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.disarm(0)
+    assert not flying.guard.arm(0)
+    output = flying.tick()
+    assert output.messages[:2] == (Stop(1, StopReason.OPERATOR, 1.0), Arm(1, is_armed=False))
+    assert output.gate is Gate.DISARMED
+
+
+def test_a_hard_stop_ends_the_grace(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.stop(0, StopReason.GUARD)
+    flying.guard.announce_stop(0, 1.0)
+    assert flying.guard.stop_reason is StopReason.GUARD
+    assert not flying.guard.is_stop_announced
+    assert flying.tick().messages[0] == Stop(1, StopReason.GUARD)
+
+
+def test_a_released_announcement_leaves_the_guard_disarmed(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.release_stop(0)
+    assert not flying.guard.is_armed
+    assert not flying.guard.is_stop_announced
+    output = flying.tick()
+    assert output.messages == (Arm(1, is_armed=False), output.command)
+    assert output.gate is Gate.DISARMED
+    assert flying.guard.tick(2000 * MS).gate is Gate.DISARMED  # and no stop comes later
+    assert flying.guard.arm(2000 * MS)
+
+
+def test_a_clock_that_goes_back_stops_whatever_the_grace(flying):
+    flying.now_ms = 1000
+    flying.guard.announce_stop(flying.now_ms * MS, 5.0)
+    assert flying.tick(-500).gate is Gate.STOPPED
+    assert flying.guard.stop_reason is StopReason.GUARD
+    assert not flying.guard.is_stop_announced
+
+
 def test_a_clock_that_goes_back_stops(flying):
     flying.now_ms = 1000
     flying.tick()
