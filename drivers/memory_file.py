@@ -53,7 +53,7 @@ class MemoryFile:
         partial = self._path.with_suffix(".part")
         try:
             partial.write_text(text, encoding="utf-8")
-            os.replace(partial, self._path)
+            partial.replace(self._path)
         except OSError as error:
             raise DeviceError(f"{self._path} cannot be written: {error.strerror or error}") from error
         self._kept = text

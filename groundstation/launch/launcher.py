@@ -237,7 +237,8 @@ class Launcher:
 
     def _start_laboratory(self, laboratory: Child) -> None:
         self._addresses = None
-        forget(self._memory)
+        if not laboratory.restarts:  # new mock-ups; one that is started again stands for the same ones
+            forget(self._memory)
         laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
 
     def close(self) -> None:

@@ -127,6 +127,7 @@ def objections(question: Question, override: str = "") -> tuple[str, ...]:
     """
     found = ((check, check.objection(question)) for check in CHECKS)
     return tuple(
-        f"{check.name}: {text}" for check, text in found if text and not (override and check.may_be_overridden)
+        f"{check.name}: {text}"
+        for check, text in found
+        if text and not (override and check.may_be_overridden)
     )
-

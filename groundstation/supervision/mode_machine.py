@@ -1,4 +1,4 @@
-"""The state machine of one vehicle: modes, what is latched, and what braking leads to. Pure; time is an argument.
+"""The state machine of one vehicle: modes, what is latched, and what braking leads to. Pure.
 
 What a person closed, a person opens: a stop ends by a release alone, and after ``land``, ``disarm`` or
 ``float_off`` only a person's request lets the vehicle fly. What must survive a restart is its ``Memory``.

@@ -60,7 +60,7 @@ class Guarantee:
 GUARANTEES: Mapping[Mode, Guarantee] = {
     Mode.LANDED: Guarantee(Law.CLOSED, False, Air.OFF, "Air off, valves closed, disarmed."),
     Mode.RESTING: Guarantee(
-        Law.CLOSED, False, Air.OFF, "As landed; it takes off as soon as every check of the arming gate passes."
+        Law.CLOSED, False, Air.OFF, "As landed; it takes off once every check of the arming gate passes."
     ),
     Mode.FLOATING: Guarantee(
         Law.CLOSED, False, Air.ON, "Air on by a person's explicit wish, valves closed, disarmed: it slides."

@@ -26,7 +26,7 @@ LEAST_ROOM_S = 60.0
 REST_SPEED_M_S, REST_RATE_RAD_S = 0.012, math.radians(3.0)
 """Slower than this counts as at rest: the estimate's own noise, and what dry friction takes at once."""
 OVERHANG_M = 0.05
-"""So far beyond its part of the table a predicted stop may lie before the air is cut: the estimate's noise."""
+"""So far beyond its part of the table a predicted stop may lie before the air is cut: noise."""
 REACTION_S = 0.15
 """Age of the state, a modulation period, the opening of a valve."""
 UNDERVOLTAGE = 1
@@ -228,9 +228,12 @@ class Sightings:
                 yield "node_disobeys", "it reports that it is disarmed"
             elif node.dead_man:
                 yield "node_disobeys", "its dead man has closed the valves"
-        if may_open and not self.is_state_silent(now_ns):  # without a state no controller works
-            if self.is_silent(self.demand_ns, CONTROLLER_S, now_ns):
-                yield "controller_silent", _age("demand", self.demand_ns, now_ns)
+        if (
+            may_open
+            and not self.is_state_silent(now_ns)  # without a state no controller works
+            and self.is_silent(self.demand_ns, CONTROLLER_S, now_ns)
+        ):
+            yield "controller_silent", _age("demand", self.demand_ns, now_ns)
 
 
 def _age(what: str, arrival_ns: int | None, now_ns: int) -> str:

@@ -97,7 +97,9 @@ class Supervisor:
             override: Reason to fly in spite of the checks that may be overridden; empty for none.
         """
         against = self._objections(now_ns, override)
-        refusal = self._machine.apply(event, now_ns, author, f"override: {override}" if override else "", against)
+        refusal = self._machine.apply(
+            event, now_ns, author, f"override: {override}" if override else "", against
+        )
         if not refusal and event in (Event.FLY, Event.RELEASE):
             self._override = override
             self.board.clear()
@@ -177,7 +179,9 @@ class Supervisor:
                 self._machine.apply(Event.FAULT_CUTS, now_ns, cause=min(hopeless))
 
 
-_HOPELESS = frozenset({"state_silent", "fusion_lost", "edge_unavoidable", "vehicle_unavoidable", "can_silent"})
+_HOPELESS = frozenset(
+    {"state_silent", "fusion_lost", "edge_unavoidable", "vehicle_unavoidable", "can_silent"}
+)
 _EVENTS = {
     Response.HOLD: Event.FAULT_HOLDS,
     Response.LAND: Event.FAULT_LANDS,

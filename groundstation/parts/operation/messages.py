@@ -3,7 +3,16 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, PACKAGE, U8, U64, Float64Sequence, Message, Text, TextSequence
+from groundstation.declarations.message import (
+    F64,
+    PACKAGE,
+    U8,
+    U64,
+    Float64Sequence,
+    Message,
+    Text,
+    TextSequence,
+)
 from groundstation.declarations.topic import Scope, Topic
 
 

@@ -176,5 +176,3 @@ def _seen(message: VehicleState, now_ns: int) -> Seen:
         message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
     )
     return Seen(now_ns, state, message.status, message.pose_sigma)
-
-
