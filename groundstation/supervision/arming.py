@@ -8,7 +8,7 @@ from groundstation.supervision.fault_board import Standing
 from groundstation.supervision.sightings import Sightings
 
 NEAREST_M = 0.45
-"""Between the centres of two mock-ups, least distance at take-off: bodies and the way that one drifts first."""
+"""Between the centres of two mock-ups at take-off: both bodies, and the way that one drifts first."""
 OLDEST_FIX_S = 3.0
 
 

@@ -4,7 +4,9 @@ from collections import deque
 from collections.abc import Iterator
 from statistics import median
 
-SHORTEST_OUTAGE_S = 0.5
+SHORTEST_OUTAGE_S, UNKNOWN_OUTAGE_S = 0.5, 3.0
+KNOWN_INTERVALS = 3
+"""So many intervals between fixes say how often they usually come."""
 PERIODS = 3.0
 LASTING_S = 1.0
 REFUSED_IN_A_ROW = 8
@@ -49,7 +51,9 @@ class FixWatch:
                 yield fault, detail
         if self._used_ns is None:
             return
-        usual_s = median(self._intervals_s) if self._intervals_s else 0.0
+        longest_s = UNKNOWN_OUTAGE_S
+        if len(self._intervals_s) >= KNOWN_INTERVALS:
+            longest_s = max(SHORTEST_OUTAGE_S, PERIODS * median(self._intervals_s))
         age_s = (now_ns - self._used_ns) * 1e-9
-        if age_s > max(SHORTEST_OUTAGE_S, PERIODS * usual_s):
+        if age_s > longest_s:
             yield "star_outage", f"no fix for {age_s:.1f} s"

@@ -29,6 +29,10 @@ OVERHANG_M = 0.05
 """So far beyond its part of the table a predicted stop may lie before the air is cut: noise."""
 REACTION_S = 0.15
 """Age of the state, a modulation period, the opening of a valve."""
+ONLY_ALOFT = frozenset(
+    {"star_outage", "wrong_fixes", "pushed", "valve_stuck_open", "valve_stuck_closed", "valve_weak"}
+)
+"""What is found by how it moves means nothing on the ground, where people lift it and friction holds it."""
 UNDERVOLTAGE = 1
 """Bit of the valve node's faults."""
 
@@ -137,17 +141,20 @@ class Sightings:
         horizon_ns = now_ns - round(OTHER_S * NS_PER_S)
         return {name: seen.state for name, seen in self.others.items() if seen.arrival_ns >= horizon_ns}
 
-    def found(self, now_ns: int, *, is_aloft: bool, may_open: bool) -> dict[str, str]:
+    def found(self, now_ns: int, *, is_grounded: bool, is_aloft: bool, may_open: bool) -> dict[str, str]:
         """Faults seen at this moment, by id with details.
 
         Args:
             now_ns: The moment.
+            is_grounded: The air is off and known to be: who has just begun may still be silent.
             is_aloft: The float air is on, or about to be: what concerns motion is looked at, too.
             may_open: The guard is armed and the valve node should be.
         """
-        found = dict(self.findings)
-        if is_aloft or now_ns - self.began_ns > STARTING_S * NS_PER_S:
-            found.update(self._silences(now_ns, is_aloft=is_aloft))
+        found = {
+            fault: detail for fault, detail in self.findings.items() if is_aloft or fault not in ONLY_ALOFT
+        }
+        if not is_grounded or now_ns - self.began_ns > STARTING_S * NS_PER_S:
+            found.update(self._silences(now_ns, is_grounded=is_grounded))
         found.update(self._station())
         found.update(self._supplies())
         if is_aloft:
@@ -156,8 +163,8 @@ class Sightings:
             found.update(self._obedience(now_ns, may_open=may_open))
         return found
 
-    def _silences(self, now_ns: int, *, is_aloft: bool) -> Iterator[tuple[str, str]]:
-        if self.is_state_silent(now_ns) and (self.own is not None or is_aloft):
+    def _silences(self, now_ns: int, *, is_grounded: bool) -> Iterator[tuple[str, str]]:
+        if self.is_state_silent(now_ns) and (self.own is not None or not is_grounded):
             yield "state_silent", _age("state", None if self.own is None else self.own.arrival_ns, now_ns)
         if self.is_node_silent(now_ns):
             yield "can_silent", _age("status", None if self.node is None else self.node.arrival_ns, now_ns)

@@ -6,7 +6,7 @@ from groundstation.supervision.arming import Question, objections
 from groundstation.supervision.fault_board import FaultBoard, Standing
 from groundstation.supervision.faults import Clears, Response
 from groundstation.supervision.mode_machine import GRACE_S, Memory, ModeMachine, Then
-from groundstation.supervision.modes import ALOFT, BRAKEABLE, GUARANTEES, Air, Event, Law, Mode
+from groundstation.supervision.modes import ALOFT, BRAKEABLE, GROUNDED, GUARANTEES, Air, Event, Law, Mode
 from groundstation.supervision.sightings import Sightings
 
 LIFT_S = 0.3
@@ -110,8 +110,12 @@ class Supervisor:
         machine, sightings = self._machine, self.sightings
         sightings.look(now_ns, self._period_ns)
         self._follow_node(now_ns)
-        is_aloft = self.mode in ALOFT
-        found = sightings.found(now_ns, is_aloft=is_aloft, may_open=GUARANTEES[self.mode].may_open)
+        found = sightings.found(
+            now_ns,
+            is_grounded=self.mode in GROUNDED,
+            is_aloft=self.mode in ALOFT,
+            may_open=GUARANTEES[self.mode].may_open,
+        )
         if self._restarted:
             found[RESTARTED], self._restarted = self._restarted, ""
         changed = self.board.look(now_ns, found)
@@ -173,7 +177,7 @@ class Supervisor:
         """A stop without a state to brake on, or without room, cuts the air at once."""
         sightings = self.sightings
         if self.mode in BRAKEABLE:
-            found = sightings.found(now_ns, is_aloft=True, may_open=True)
+            found = sightings.found(now_ns, is_grounded=False, is_aloft=True, may_open=True)
             hopeless = found.keys() & _HOPELESS
             if hopeless:
                 self._machine.apply(Event.FAULT_CUTS, now_ns, cause=min(hopeless))

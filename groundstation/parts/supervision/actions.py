@@ -11,9 +11,7 @@ ACTIONS = table_of(
     Action("land", "supervisor", "cut the float air now; only a person lets it fly again"),
     Action("stop", "supervisor", "brake, hold, land, and latch it; pressed again: land at once"),
     Action("release", "supervisor", "end a latched stop, clear faults that are gone; it stays landed"),
-    Action(
-        "arm", "supervisor", "let valves open; the controller commands once it floats", (OVERRIDE,)
-    ),
+    Action("arm", "supervisor", "let valves open; the controller commands once it floats", (OVERRIDE,)),
     Action("disarm", "supervisor", "close all valves and cut the float air"),
     Action("float_on", "supervisor", "switch the float air on; an unarmed vehicle then slides"),
     Action("float_off", "supervisor", "cut the float air: the vehicle lands"),
