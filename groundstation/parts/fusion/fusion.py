@@ -13,6 +13,7 @@ from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
 from groundstation.fusion.estimator import WAITS, Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
+from groundstation.fusion.fix_repeats import REPEATS, FixRepeats
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
@@ -65,6 +66,7 @@ class Fusion(Node):
             source: np.diag([xy_m**2, xy_m**2, heading_rad**2])
             for source, (xy_m, heading_rad) in floors.items()
         }
+        self._repeats = FixRepeats()
         self._skipped_ms = 0
         self._rest_since_ns: int | None = None
         self._rest_ns = 0
@@ -144,6 +146,11 @@ class Fusion(Node):
             yield self._say(state)
 
     def _correct(self, fix: PoseFix, source: str, now_ns: int) -> Iterator[Message]:
+        if self._repeats.is_repeated(source, (fix.x_m, fix.y_m, fix.heading_rad)):
+            self._estimator.counters.add("fix_" + REPEATS.replace(" ", "_"))
+            nothing = (math.nan,) * 4
+            yield self._account(FixOutcome(fix.stamp_ns, False, REPEATS, *nothing, source), now_ns)
+            return
         covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
             motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.rate_rad_s])
