@@ -17,7 +17,6 @@ from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.failures import Failures
 from firmware_emulator.mock_up_config import VehicleConfig
-from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
 from firmware_emulator.scenario import MockUp

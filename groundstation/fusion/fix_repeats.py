@@ -22,7 +22,7 @@ class FixRepeats:
         self._poses: dict[str, deque[Pose]] = {}
 
     def is_repeated(self, source: str, pose: Pose) -> bool:
-        """Take a pose at its arrival; True where the source gave it before, equal in every bit of all three."""
+        """Take a pose at its arrival; True where its source gave it before, all three numbers equal."""
         poses = self._poses.setdefault(source, deque(maxlen=REMEMBERED))
         if pose in poses:
             return True

@@ -6,6 +6,7 @@ for byte was not taken twice, it was delivered twice, and a fix made of it would
 
 from __future__ import annotations
 
+import itertools
 import zlib
 from collections.abc import Iterator
 
@@ -44,8 +45,8 @@ class PictureRepeats:
             stamp_ns: Of the picture; those of one camera in their order.
         """
         edges = [len(picture) * band // BANDS for band in range(BANDS + 1)]
-        bands = [picture[start:stop] for start, stop in zip(edges, edges[1:], strict=False)]
-        sums = np.array([zlib.crc32(band) for band in bands], np.uint32)
+        bands = [picture[start:stop] for start, stop in itertools.pairwise(edges)]
+        sums = np.array([zlib.crc32(band.data) for band in bands], np.uint32)
         equal = self._sums == sums
         whole = np.flatnonzero(equal.all(axis=1))
         again = [int(band) for band in np.flatnonzero(equal.any(axis=0))]
