@@ -17,7 +17,6 @@ from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.failures import Failures
 from firmware_emulator.mock_up_config import VehicleConfig
-from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
 from firmware_emulator.scenario import MockUp
@@ -129,7 +128,7 @@ class FixStream:
         self._start_ns = start_ns
         self.next_ns = start_ns + self._period_ns
         self._sequence = 0
-        self._frozen: Motion | None = None
+        self._frozen: tuple[float, float, float] | None = None
         self._last_arrival_ns = 0
         self._pending: deque[tuple[int, bytes]] = deque()
 
@@ -154,16 +153,18 @@ class FixStream:
             return
         if missing < self._errors.missing_fraction:
             return
-        if not self._failures.active("frozen_camera", age_ns):
-            self._frozen = None
-        elif self._frozen is None:
-            self._frozen = self._vehicle.origin_at(now_ns)
-        motion = self._frozen or self._vehicle.origin_at(now_ns)
+        motion = self._vehicle.origin_at(now_ns)
         x_m = motion.x_m + self._errors.sigma_xy_m * draws[0]
         y_m = motion.y_m + self._errors.sigma_xy_m * draws[1]
         heading_rad = motion.heading_rad + self._errors.sigma_heading_rad * draws[2]
         if wrong < self._errors.wrong_fraction or self._failures.active("false_lights", age_ns):
             x_m, y_m, heading_rad = self._mistaken(x_m, y_m, heading_rad, bool(gross < _GROSS_SHARE))
+        if not self._failures.active("frozen_camera", age_ns):
+            self._frozen = None
+        elif self._frozen is None:
+            self._frozen = (x_m, y_m, heading_rad)
+        else:  # the picture is the same, so its noise is
+            x_m, y_m, heading_rad = self._frozen
         self._send(now_ns, float(draws[3]), float(x_m), float(y_m), float(heading_rad))
 
     def _mistaken(self, x_m: float, y_m: float, heading_rad: float, is_gross: bool) -> tuple[float, ...]:

@@ -59,7 +59,7 @@ class SkyRenderer:
         return self._camera.render(
             exposure.start,
             exposure.end,
-            sequence=exposure.sequence,
+            sequence=exposure.sequence if exposure.repeats is None else exposure.repeats,
             is_sky_dead=exposure.is_sky_dead,
             false_lights=exposure.false_lights,
             sky_failures=exposure.sky_failures,

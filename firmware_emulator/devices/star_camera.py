@@ -5,7 +5,7 @@ drawn at once (lockstep) or by another process (live).
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Exposure:
         is_sky_dead: The lights are off.
         false_lights: Lights to add that no catalogue knows.
         sky_failures: LEDs that differ from the list; None if all hang and shine as listed.
+        repeats: Number of the exposure whose picture comes again, byte for byte; None for one of its own.
     """
 
     sequence: int
@@ -48,6 +49,7 @@ class Exposure:
     is_sky_dead: bool
     false_lights: int
     sky_failures: SkyFailures | None = None
+    repeats: int | None = None
 
 
 class StarCamera:
@@ -85,7 +87,7 @@ class StarCamera:
         self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._opens_ns = start_ns + self._period_ns
         self._start: Motion | None = None
-        self._frozen: tuple[Pose, Pose] | None = None
+        self._frozen: Exposure | None = None
         self._sequence = 0
         self._last_arrival_ns = 0
         self._pending: deque[tuple[int, Exposure]] = deque()
@@ -117,11 +119,6 @@ class StarCamera:
         jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
         arrival_ns = max(now_ns, middle_ns + self._delay_ns + round(jitter * self._jitter_ns))
         self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
-        if not self._failures.active("frozen_camera", age_ns):
-            self._frozen = None
-        elif self._frozen is None:
-            self._frozen = (start, end)
-        start, end = self._frozen or (start, end)
         false_lights = self._failures.active("false_lights", age_ns)
         exposure = Exposure(
             self._sequence,
@@ -133,6 +130,19 @@ class StarCamera:
             int(false_lights.parameters["count"]) if false_lights else 0,
             self._sky_failures(age_ns),
         )
+        if not self._failures.active("frozen_camera", age_ns):
+            self._frozen = None
+        elif self._frozen is None:
+            self._frozen = exposure
+        else:
+            frozen = self._frozen
+            exposure = replace(
+                frozen,
+                sequence=exposure.sequence,
+                middle_ns=middle_ns,
+                arrival_ns=exposure.arrival_ns,
+                repeats=frozen.sequence,
+            )
         self._sequence += 1
         if not self._failures.active("silent_camera", age_ns):
             self._pending.append((exposure.arrival_ns, exposure))

@@ -53,6 +53,9 @@ def test_a_frozen_camera_repeats_one_pose_and_a_silent_one_counts_on():
     frozen = expose(2, [Failure("frozen_camera", S, None, {})])
     assert len({exposure.start for exposure in frozen[-5:]}) == 1
     assert len({exposure.sequence for exposure in frozen}) == len(frozen)
+    first = next(exposure for exposure in frozen if exposure.middle_ns >= S)
+    assert {exposure.repeats for exposure in frozen[first.sequence + 1 :]} == {first.sequence}
+    assert {exposure.repeats for exposure in frozen[: first.sequence + 1]} == {None}
     silent = expose(2, [Failure("silent_camera", S // 2, S, {})])
     gaps = np.diff([exposure.sequence for exposure in silent])
     assert sorted(set(gaps)) == [1, 6]
