@@ -102,10 +102,15 @@ class ImuSensors:
         self._walk_rad_s = 0.0
         self._outlier_rate_hz = outlier_rate_hz
         self._polls_to_outlier = self._draw_outlier()
-        # What X + Y is off 2048 by is shared by both channels. Columns of two: the chips x and y.
-        self._tilt_null = TILT_NULL + _column(errors.imbalance_counts) / 2.0
-        self._acc_bias, self._acc_tempco = _column(errors.acc_bias_m_s2), _column(errors.acc_tempco_m_s2_k)
-        self._acc_scale, self._acc_cross = _column(errors.acc_scale), _column(errors.acc_cross)
+        (bias_x, bias_y), (tempco_x, tempco_y) = errors.acc_bias_m_s2, errors.acc_tempco_m_s2_k
+        (scale_x, scale_y), (cross_x, cross_y) = errors.acc_scale, errors.acc_cross
+        # Codes are linear in rate, force x and force y: gain, and null at 25 deg C and per kelvin.
+        self._gain = _counts([errors.gyro_scale, 0.0, 0.0], [0.0, scale_x, cross_x], [0.0, cross_y, scale_y])
+        self._null = _counts([errors.gyro_bias_rad_s], [bias_x], [bias_y])
+        self._null_tempco = _counts([errors.gyro_tempco_rad_s_k], [tempco_x], [tempco_y])
+        # What X + Y is off 2048 by is shared by both channels.
+        null_x, null_y = (TILT_NULL + imbalance / 2.0 for imbalance in errors.imbalance_counts)
+        self._null += [[GYRO_NULL], [null_x], [null_x], [null_y], [null_y]]
         self._top = np.array([[GYRO_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP]])
 
     @staticmethod
@@ -149,18 +154,10 @@ class ImuSensors:
         self._walk_rad_s += (
             errors.gyro_walk_rad_s_sqrt_s * math.sqrt(len(felt) * _POLL_S) * self._rng.standard_normal()
         )
-        null_rad_s = errors.gyro_bias_rad_s + errors.gyro_tempco_rad_s_k * warmer_k + self._walk_rad_s
-        gyro_gain = GYRO_COUNTS_PER_RAD_S * errors.gyro_scale
-        gyro_gain *= 1.0 + errors.gyro_scale_tempco_per_k * warmer_k
-        rate_and_force = np.array(felt).T
-        rate_rad_s, force_m_s2 = rate_and_force[0], rate_and_force[1:]
-        null_m_s2 = self._acc_bias + self._acc_tempco * warmer_k
-        tilts_m_s2 = self._acc_scale * force_m_s2 + (self._acc_cross * force_m_s2[::-1] + null_m_s2)
-        tilt_counts = tilts_m_s2 * TILT_COUNTS_PER_M_S2
-        signal = np.empty((_CHANNELS, len(felt)))
-        signal[0] = GYRO_NULL + null_rad_s * GYRO_COUNTS_PER_RAD_S + gyro_gain * rate_rad_s
-        signal[1::2] = self._tilt_null + tilt_counts
-        signal[2::2] = self._tilt_null - tilt_counts
+        gain, null = self._gain.copy(), self._null + self._null_tempco * warmer_k
+        gain[0] *= 1.0 + errors.gyro_scale_tempco_per_k * warmer_k
+        null[0] += self._walk_rad_s * GYRO_COUNTS_PER_RAD_S
+        signal: Array = gain @ np.array(felt).T + null
         return signal
 
     def _next_noise(self, polls: int) -> Array:
@@ -192,5 +189,8 @@ class ImuSensors:
         self._polls_to_outlier -= polls
 
 
-def _column(pair: tuple[float, float]) -> Array:
-    return np.array(pair)[:, None]
+def _counts(gyro_rad_s: list[float], x_m_s2: list[float], y_m_s2: list[float]) -> Array:
+    """Rows of gyro and tilt chips in counts of the five channels; the second channel of a chip is opposed."""
+    gyro, x, y = np.array(gyro_rad_s), np.array(x_m_s2), np.array(y_m_s2)
+    tilts = TILT_COUNTS_PER_M_S2 * np.array([x, -x, y, -y])
+    return np.vstack([GYRO_COUNTS_PER_RAD_S * gyro, tilts])
