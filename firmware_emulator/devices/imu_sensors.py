@@ -154,10 +154,12 @@ class ImuSensors:
         self._walk_rad_s += (
             errors.gyro_walk_rad_s_sqrt_s * math.sqrt(len(felt) * _POLL_S) * self._rng.standard_normal()
         )
-        gain, null = self._gain.copy(), self._null + self._null_tempco * warmer_k
-        gain[0] *= 1.0 + errors.gyro_scale_tempco_per_k * warmer_k
-        null[0] += self._walk_rad_s * GYRO_COUNTS_PER_RAD_S
-        signal: Array = gain @ np.array(felt).T + null
+        gyro_scale = errors.gyro_scale * (1.0 + errors.gyro_scale_tempco_per_k * warmer_k)
+        self._gain[0, 0] = GYRO_COUNTS_PER_RAD_S * gyro_scale
+        null = self._null + self._null_tempco * warmer_k
+        null[0, 0] += GYRO_COUNTS_PER_RAD_S * self._walk_rad_s
+        signal: Array = np.dot(self._gain, np.array(felt).T)
+        signal += null
         return signal
 
     def _next_noise(self, polls: int) -> Array:
