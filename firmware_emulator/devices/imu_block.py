@@ -35,7 +35,7 @@ from firmware_emulator.devices.imu_sensors import Disturbances, ImuSensors
 from firmware_emulator.devices.sensor_errors import WarmUp
 from firmware_emulator.devices.serial_line import PACKET_BYTES, SerialLine
 from firmware_emulator.failures import Failures
-from firmware_emulator.plant.motion_state import PollGrid, last_polls
+from firmware_emulator.plant.motion_state import PollGrid
 from firmware_emulator.plant.rigid_body import Vehicle
 
 GYRO_START_NS = 35_000_000  # ADIS16100 data sheet
@@ -138,7 +138,7 @@ class ImuBlock:
         self._vehicle.advance(stamp_ns)
         temperature_c = self._warm_up.at((stamp_ns - self._start_ns) / 1e9)
         disturbances = self._ailments.at(stamp_ns - self._start_ns, self._window_end)
-        felt = last_polls(self._vehicle.take_felt(), self._window)
+        felt = self._vehicle.take_felt()[-self._window :]  # a block that restarts misses those before
         gyro, tilts = self._sensors.average(felt, temperature_c, disturbances)
         self._ailments.held_gyro_code = round(gyro)
         self._frames += 1

@@ -8,8 +8,6 @@ beyond the middle heading (4e-6 of the force at 1 rad/s), the change of drag and
 
 import math
 
-import numpy as np
-
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.body import Body, DryFriction, Push
 from firmware_emulator.plant.motion_state import Felt, Motion, PollGrid
@@ -59,7 +57,6 @@ class Vehicle:
         self._friction = DryFriction(friction_landed, body)
         self._polls = polls
         self._poll = polls.last_poll(start_ns)
-        self._ramp = np.arange(16, dtype=np.float64)
         self._float_change_ns = FAR_FUTURE_NS
         self._float_wanted = is_floating
         self._pushes: list[Push] = []
@@ -106,7 +103,7 @@ class Vehicle:
         return self._glided((stamp_ns - self.now_ns) / NS_PER_S)[0].of_point(self._origin_from_com_m)
 
     def take_felt(self) -> list[Felt]:
-        """What the IMU felt at the polls since the last call, in order."""
+        """What the IMU felt at each poll since the last call, in order."""
         felt, self._felt = self._felt, []
         return felt
 
@@ -207,24 +204,25 @@ class Vehicle:
             turn = -self.body.drag_nm_s * rate / inertia
             force_x = push_x - turn * arm_y - rate * rate * arm_x
             force_y = push_y + turn * arm_x - rate * rate * arm_y
-            self._felt.append(Felt(count, rate, force_x, force_y))
+            self._felt += [(rate, force_x, force_y)] * count
             return
-        if count > self._ramp.size:
-            self._ramp = np.arange(2 * count, dtype=np.float64)
         first_s = (self._polls.stamp_ns(first_poll + 1) - self.now_ns) / NS_PER_S
-        times_s = first_s + (self._polls.period_ns / NS_PER_S) * self._ramp[:count]
-        left = np.exp(times_s * (-1.0 / bank.timing.rise_s))
+        period_s = self._polls.period_ns / NS_PER_S
         fx, fy, torque = bank.target
         gx, gy, gtorque = bank.wrench[0] - fx, bank.wrench[1] - fy, bank.wrench[2] - torque
-        turns = (torque / inertia) + (gtorque / inertia) * left
-        rates = (rate + (torque / inertia) * times_s) + (gtorque / inertia * bank.timing.rise_s) * (
-            1.0 - left
-        )
-        squares = rates * rates
-        mass = self.body.mass_kg
-        forces_x = (push_x + fx / mass) + (gx / mass) * left - arm_y * turns - arm_x * squares
-        forces_y = (push_y + fy / mass) + (gy / mass) * left + arm_x * turns - arm_y * squares
-        self._felt.append(Felt(count, rates, forces_x, forces_y))
+        rise_s, mass = bank.timing.rise_s, self.body.mass_kg
+        turn_end, turn_excess = torque / inertia, gtorque / inertia
+        end_x, end_y = push_x + fx / mass, push_y + fy / mass
+        excess_x, excess_y = gx / mass, gy / mass
+        for poll in range(count):  # a piece has ten or so, for which arrays cost more than their sums
+            time_s = first_s + period_s * poll
+            left = math.exp(-time_s / rise_s)
+            turn = turn_end + turn_excess * left
+            rate_then = rate + turn_end * time_s + turn_excess * rise_s * (1.0 - left)
+            square = rate_then * rate_then
+            force_x = end_x + excess_x * left - arm_y * turn - arm_x * square
+            force_y = end_y + excess_y * left + arm_x * turn - arm_y * square
+            self._felt.append((rate_then, force_x, force_y))
 
     def _is_sliding(self) -> bool:
         return self.motion.vx_m_s != 0.0 or self.motion.vy_m_s != 0.0 or self.motion.rate_rad_s != 0.0
@@ -245,5 +243,5 @@ class Vehicle:
             square = now.rate_rad_s * now.rate_rad_s
             force_x = cosine * felt_x + sine * felt_y - square * arm_x
             force_y = cosine * felt_y - sine * felt_x - square * arm_y
-            self._felt.append(Felt(count, now.rate_rad_s, force_x, force_y))
+            self._felt += [(now.rate_rad_s, force_x, force_y)] * count
         self.thrusters.relax(duration_s)

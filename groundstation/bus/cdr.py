@@ -39,19 +39,16 @@ class Codec(Generic[M]):
         first, *rest = [*parts(cls)] or [Run(())]
         # what follows the header at a fixed distance is packed together with it
         self._first = first if isinstance(first, Run) else Run(())
+        self._flat = self._first.flat
         self._rest: tuple[Part, ...] = tuple(rest if first is self._first else (first, *rest))
         self._openings: dict[int, struct.Struct] = {}
-        self._names: dict[str, bytes] = {}
+        self._heads: dict[str, tuple[Callable[..., bytes], int, bytes]] = {}  # by the name of the vehicle
 
     def encode(self, message: M) -> bytes:
         """Serialise a payload, encapsulation header included."""
-        name = self._names.get(message.vehicle)
-        if name is None:
-            name = self._names[message.vehicle] = message.vehicle.encode() + b"\0"
-        length = len(name)
-        opening = self._openings.get(length) or self._opening(length)
+        pack, length, name = self._heads.get(message.vehicle) or self._head(message.vehicle)
         seconds, nanoseconds = divmod(message.stamp_ns, _NS)
-        head = opening.pack(ENCAPSULATION, seconds, nanoseconds, length, name, *self._first.flat(message))
+        head = pack(ENCAPSULATION, seconds, nanoseconds, length, name, *self._flat(message))
         if not self._rest:
             return head
         out = bytearray(head)
@@ -85,6 +82,13 @@ class Codec(Generic[M]):
         if len(data) - position > _MAX_PADDING:
             raise CodecError(f"{self._cls.__name__}: {len(data) - position} bytes too many")
         return self._build(*values)
+
+    def _head(self, vehicle: str) -> tuple[Callable[..., bytes], int, bytes]:
+        """What packs the head of this vehicle's messages, and its name as packed there."""
+        name = vehicle.encode() + b"\0"
+        opening = self._openings.get(len(name)) or self._opening(len(name))
+        found = self._heads[vehicle] = opening.pack, len(name), name
+        return found
 
     def _opening(self, length: int) -> struct.Struct:
         """Encapsulation, header with a name of ``length`` bytes, and the first run."""
