@@ -65,6 +65,11 @@ class ValveBus:
             for frame in node.outbox:
                 self._pending.append((self._transmit(now_ns, frame), frame))
             node.outbox.clear()
+            for frame in node.babbled:
+                # Waiting, it is replaced by its node's next one: nothing of it queues up.
+                if self._free_ns <= now_ns:
+                    self._pending.append((self._transmit(now_ns, frame), frame))
+            node.babbled.clear()
 
     def take(self, until_ns: int) -> list[tuple[int, CanFrame]]:
         """Frames that reached the host up to `until_ns`."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from drivers.imu_block.protocol import encode_identify
 from drivers.valve_bus.protocol import Arm, ValveCommand, encode
 from firmware_emulator.failures import FAILURE_KINDS, Failure, FailureConfig, Failures
 from firmware_emulator.laboratory import EmulatedLaboratory
@@ -63,6 +64,8 @@ def fly(scene, failures, source, *, has_overhead=False):
         arrivals += laboratory.advance(tick * 20 * MS)
         on_times = (30,) * 4 + (0,) * 4 if tick % 5 == 0 else (0,) * 8
         command = ValveCommand(0, tick & 15, (tick // 5) & 15, on_times)
+        if tick % 10 == 0:
+            laboratory.deliver(tick * 20 * MS, "alpha/imu", encode_identify(tick))
         laboratory.deliver(tick * 20 * MS, "valve_bus", encode(command))
     arrivals += laboratory.advance(S)
     return arrivals
