@@ -1,4 +1,4 @@
-"""When a valve node lands by itself, and what it refuses then (`docs/interfaces/valve_bus.md`, rules 2, 6)."""
+"""When a valve node lands by itself, and what it refuses then: rules 2 and 6 of the valve bus' document."""
 
 from drivers.valve_bus.protocol import SILENCE_LANDS_S
 from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S
