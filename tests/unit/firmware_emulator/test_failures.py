@@ -116,6 +116,22 @@ def test_a_failure_of_an_unknown_vehicle_or_valve_is_refused():
         FailureConfig(kind="leaking_valve", vehicle="alpha", parameters={"valve": 8})
 
 
+@pytest.mark.parametrize(
+    ("kind", "vehicle", "reason"),
+    [
+        ("dead_sky", {"camera": {"source": "none"}}, "has no camera"),
+        ("moved_star", {}, "rendered pictures only, and camera.source is 'fixes'"),
+        ("hidden_discs", {}, "no section 'overhead'"),
+        ("hidden_body", {}, "no section 'motion_capture'"),
+        ("other_imu", {"imu": {"frame_version": 1}}, "reports no serial number"),
+    ],
+)
+def test_a_failure_that_finds_nothing_to_befall_is_refused(kind, vehicle, reason):
+    row = {"kind": kind, "vehicle": "alpha"}
+    with pytest.raises(ValidationError, match=f"failure '{kind}' of 'alpha' cannot happen: .*{reason}"):
+        EmulatedLaboratory({"vehicles": [{"name": "alpha", **vehicle}], "failures": [row]})
+
+
 def test_a_failure_that_ends_before_it_starts_is_refused():
     with pytest.raises(ValidationError, match="ends"):
         FailureConfig(kind="dead_sky", vehicle="alpha", start_s=5.0, end_s=4.0)

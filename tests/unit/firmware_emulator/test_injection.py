@@ -112,6 +112,12 @@ def test_the_same_failure_twice_is_two():
         (InjectOrder("dead_sky", "alpha", {"valve": 1}), "no parameter 'valve'; it has none"),
         (InjectOrder("leaking_valve", "alpha", {"valve": 1.5}), "valve .* whole number, got 1.5"),
         (InjectOrder("leaking_valve", "alpha", {"fraction": math.nan}), "fraction .* got nan"),
+        (
+            InjectOrder("dead_star", "alpha"),
+            "'dead_star' of 'alpha' cannot happen: .* rendered pictures",
+        ),
+        (InjectOrder("hidden_discs", "alpha"), "cannot happen: the scenario has no section 'overhead'"),
+        (InjectOrder("hidden_body", "alpha"), "cannot happen: the scenario has no section 'motion_capture'"),
         (InjectOrder("dead_sky", "alpha", for_s=0.0), "for_s must be positive"),
         (InjectOrder("dead_sky", "alpha", for_s=-1.0), "for_s must be positive"),
         (InjectOrder("dead_sky", "alpha", for_s=math.nan), "for_s must be positive"),
