@@ -37,6 +37,8 @@ class Disturbances:
     """What a self-test or a failure does to the codes of one window."""
 
     gyro_add_counts: float = 0.0
+    tilt_add_counts: tuple[float, float] = (0.0, 0.0)
+    """Of each chip: added to its X, taken from its Y."""
     gyro_stuck_code: float | None = None
     forced_tilts: dict[int, float] = field(default_factory=dict)
     """Tilt channel 0..3 (x.X, x.Y, y.X, y.Y) to the code it is forced to."""
@@ -138,6 +140,9 @@ class ImuSensors:
             signal[1:] = self._tilt_filter(signal[1:])
         if disturbances:
             signal[0] += disturbances.gyro_add_counts
+            for channel, counts in enumerate(disturbances.tilt_add_counts):
+                signal[1 + 2 * channel] += counts
+                signal[2 + 2 * channel] -= counts
         np.rint(signal, out=signal)
         np.maximum(signal, 0.0, out=signal)
         np.minimum(signal, self._top, out=signal)

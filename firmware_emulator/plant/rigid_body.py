@@ -60,6 +60,7 @@ class Vehicle:
         self._float_change_ns = FAR_FUTURE_NS
         self._float_wanted = is_floating
         self._pushes: list[Push] = []
+        self._hand = (0.0, 0.0, 0.0)
         self._slope_at = (math.inf, math.inf)
         self._slope = (0.0, 0.0)
         self._felt: list[Felt] = []
@@ -74,6 +75,13 @@ class Vehicle:
         """Give the centre of mass an impulse (table frame) spread evenly over a duration from now."""
         force = NS_PER_S / duration_ns
         self._pushes.append(Push(impulse_x_n_s * force, impulse_y_n_s * force, self.now_ns + duration_ns))
+
+    def set_hand(self, force_x_n: float, force_y_n: float, torque_nm: float) -> None:
+        """Let a hand push from now on: force on the centre of mass (table frame) and torque; zeros end it.
+
+        A landed vehicle does not yield.
+        """
+        self._hand = (force_x_n, force_y_n, torque_nm)
 
     def advance(self, until_ns: int) -> None:
         """Move on to `until_ns`, which is not before now."""
@@ -137,9 +145,9 @@ class Vehicle:
         return self._slope[0] + jerk_x, self._slope[1] + jerk_y
 
     def _pushed_acceleration(self) -> tuple[float, float]:
-        """By drag and bumpers, table frame: what the IMU feels beside the thrust."""
-        ax = -self.body.drag_n_s_m * self.motion.vx_m_s
-        ay = -self.body.drag_n_s_m * self.motion.vy_m_s
+        """By drag, hand and bumpers, table frame: what the IMU feels beside the thrust."""
+        ax = self._hand[0] - self.body.drag_n_s_m * self.motion.vx_m_s
+        ay = self._hand[1] - self.body.drag_n_s_m * self.motion.vy_m_s
         for push in self._pushes:
             ax += push.fx_n
             ay += push.fy_n
@@ -155,6 +163,9 @@ class Vehicle:
         rate = now.rate_rad_s + turn_rad_s2 * duration_s
         dvx, dvy = (push_x + glide_x) * duration_s, (push_y + glide_y) * duration_s
         dx, dy = 0.5 * dvx * duration_s, 0.5 * dvy * duration_s
+        if self._hand[2] != 0.0:
+            rate += self._hand[2] / body.inertia_kg_m2 * duration_s
+            heading += self._hand[2] / body.inertia_kg_m2 * 0.5 * duration_s * duration_s
         if not bank.is_quiet:
             rise_s = bank.timing.rise_s
             once_s = rise_s * -math.expm1(-duration_s / rise_s)  # integral of the decay
@@ -200,7 +211,7 @@ class Vehicle:
         bank, inertia = self.thrusters, self.body.inertia_kg_m2
         arm_x, arm_y = self._imu_from_com_m
         rate = self.motion.rate_rad_s
-        if bank.is_quiet:  # drag alone: alike within a piece
+        if bank.is_quiet and self._hand[2] == 0.0:  # drag alone: alike within a piece
             turn = -self.body.drag_nm_s * rate / inertia
             force_x = push_x - turn * arm_y - rate * rate * arm_x
             force_y = push_y + turn * arm_x - rate * rate * arm_y
@@ -211,7 +222,7 @@ class Vehicle:
         fx, fy, torque = bank.target
         gx, gy, gtorque = bank.wrench[0] - fx, bank.wrench[1] - fy, bank.wrench[2] - torque
         rise_s, mass = bank.timing.rise_s, self.body.mass_kg
-        turn_end, turn_excess = torque / inertia, gtorque / inertia
+        turn_end, turn_excess = (torque + self._hand[2]) / inertia, gtorque / inertia
         end_x, end_y = push_x + fx / mass, push_y + fy / mass
         excess_x, excess_y = gx / mass, gy / mass
         for poll in range(count):  # a piece has ten or so, for which arrays cost more than their sums
