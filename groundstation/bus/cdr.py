@@ -13,10 +13,11 @@ from typing import Any, Generic, TypeVar
 from groundstation.bus.cdr_fields import Part, Run, parts, ros_fields
 from groundstation.declarations.message import Message
 
-__all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields"]
+__all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields", "stamp_of"]
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
+_STAMP = struct.Struct("<4sII")
 _MAX_PADDING = 3  # DDS may round a serialised payload up to four bytes
 
 M = TypeVar("M", bound=Message)
@@ -95,6 +96,22 @@ class Codec(Generic[M]):
         layout = self._first.layout(12 + length)
         compiled = self._openings[length] = struct.Struct(f"<4siII{length}s{layout}")
         return compiled
+
+
+def stamp_of(data: bytes) -> int:
+    """Stamp (ns) of an encoded payload, whatever its class: the header comes first in all.
+
+    Raises:
+        CodecError: The bytes are cut off or are no little-endian CDR.
+    """
+    try:
+        encapsulation, seconds, nanoseconds = _STAMP.unpack_from(data)
+    except struct.error as error:
+        raise CodecError(f"cut off after {len(data)} bytes") from error
+    if encapsulation != ENCAPSULATION:
+        raise CodecError(f"expected little-endian CDR, found {data[:4].hex()}")
+    stamp_ns: int = seconds * _NS + nanoseconds
+    return stamp_ns
 
 
 @functools.cache
