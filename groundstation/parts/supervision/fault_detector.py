@@ -6,7 +6,7 @@ from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.fusion.messages import FixAccount
-from groundstation.parts.imu.messages import Imu
+from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.supervision.messages import Findings
 from groundstation.supervision.fix_watch import FixWatch
 from groundstation.supervision.imu_watch import ImuWatch
@@ -38,7 +38,11 @@ class FaultDetector(Node):
         match message:
             case Imu():
                 self._imu.take(
-                    now_ns, is_valid=message.valid, reason=message.reason, elapsed_ms=message.elapsed_ms
+                    now_ns,
+                    is_valid=message.valid,
+                    is_rate_usable=bool(message.usable & USABLE_RATE),
+                    reason=message.reason,
+                    elapsed_ms=message.elapsed_ms,
                 )
             case FixAccount():
                 self._fixes.take_account(now_ns, is_used=message.used, reason=message.reason)
