@@ -54,12 +54,13 @@ class ImuConsistencyConfig:
     fixes: float = 540_000.0
 
 
-_PAIR_CAP = 4.0
-"""One pair of fixes proves nothing, however far off: one of them may be wrong."""
-_LONGEST_PAIR_S = 2.0
+_FIX_CAP = 4.0
+_BELIEVED_SIGMAS = 3.0
+"""One fix proves nothing, however far off: it may be wrong."""
+_LONGEST_GAP_S = 2.0
 _LARGEST_STEP_RAD_S = 0.2
 """A turn that a larger step would take is a wrong fix; after three of them in a row the one before was."""
-_GROSS_IN_A_ROW = 3
+_WRONG_IN_A_ROW = 3
 _KEPT = 8
 _COHERENT = 0.7
 
@@ -72,6 +73,36 @@ class _Source:
     run: int = 0
     scatter: float = 0.0
     innovations: list[tuple[float, float, float]] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Lean:
+    """The case that the gyro's zero jumped by a stated step, to one side."""
+
+    evidence: float = 0.0
+    offset_rad: float = 0.0  # by how much the expected heading would be off by now
+
+    def add(self, gap_rad: float, moved_rad: float, variance: float, gain: float) -> None:
+        """Take a fix: its innovation and variance, and what the step turns since the fix before."""
+        offset = self.offset_rad + moved_rad
+        added = min(_FIX_CAP, (gap_rad - 0.5 * offset) * offset / variance)
+        if self.evidence + added <= 0.0:
+            self.evidence = self.offset_rad = 0.0
+            return
+        self.evidence += added
+        self.offset_rad = (1.0 - gain) * offset
+
+
+@dataclass(slots=True)
+class _Heading:
+    """What fixes say beyond the turn by the gyro: constant, but for noise."""
+
+    stamp_ns: int
+    turned_rad: float
+    offset_rad: float
+    variance: float
+    wrong_in_a_row: int = 0
+    leans: tuple[_Lean, _Lean] = field(default_factory=lambda: (_Lean(), _Lean()))
 
 
 class ImuConsistency:
@@ -98,9 +129,7 @@ class ImuConsistency:
         self._found: dict[str, Finding] = {}
         self._turned_rad = 0.0
         self._turns: list[tuple[int, float]] = []  # stamp, turn since the start by the gyro
-        self._last_fix: dict[str, tuple[int, float, float]] = {}  # stamp, heading, turn by the gyro
-        self._gross: dict[str, int] = {}
-        self._left = self._right = 0.0
+        self._headings: dict[str, _Heading] = {}
         self._zeros: list[tuple[int, float, float, float]] = []
 
     @property
@@ -119,11 +148,11 @@ class ImuConsistency:
             span_s = (stamp_ns - self._turns[-1][0]) * 1e-9
             if not 0.0 < span_s < 0.1:
                 self._turns.clear()  # what turned the vehicle meanwhile is not known
-                self._last_fix.clear()
+                self._headings.clear()
             else:
                 self._turned_rad += rate_rad_s * span_s
         self._turns.append((stamp_ns, self._turned_rad))
-        if stamp_ns - self._turns[0][0] > 2e9 * _LONGEST_PAIR_S:
+        if stamp_ns - self._turns[0][0] > 2e9 * _LONGEST_GAP_S:
             del self._turns[: len(self._turns) // 2]
 
     def fix(self, source: str, stamp_ns: int, heading_rad: float) -> None:
@@ -134,44 +163,46 @@ class ImuConsistency:
             stamp_ns: Its exposure.
             heading_rad: As it states.
         """
-        before = self._last_fix.get(source)
         turned = self._turned_at(stamp_ns)
         if turned is None:
             return
-        here = (stamp_ns, heading_rad, turned)
-        if before is None or not 0.0 < (span_s := (stamp_ns - before[0]) * 1e-9) < _LONGEST_PAIR_S:
-            self._last_fix[source] = here
+        heading = self._headings.get(source)
+        if heading is None or not 0.0 < (span_s := (stamp_ns - heading.stamp_ns) * 1e-9) < _LONGEST_GAP_S:
+            self._headings[source] = _Heading(stamp_ns, turned, heading_rad - turned, math.inf)
             return
         config = self._config
-        by_gyro = turned - before[2]
-        gap = wrap_angle(heading_rad - before[1] - by_gyro)
-        variance = (
-            2.0 * config.heading_sigma_rad**2
-            + 2.0 * (config.stamp_sigma_s * by_gyro / span_s) ** 2
-            + (config.scale_sigma * by_gyro) ** 2
+        by_gyro = turned - heading.turned_rad
+        noise = config.heading_sigma_rad**2 + (config.stamp_sigma_s * by_gyro / span_s) ** 2
+        if math.isinf(heading.variance):
+            heading.variance = noise
+        prior = (
+            heading.variance
             + config.gyro_density_rad_s_rthz**2 * span_s
             + (config.zero_sigma_rad_s * span_s) ** 2
+            + (config.scale_sigma * by_gyro) ** 2
         )
-        gross = abs(gap) > _LARGEST_STEP_RAD_S * span_s + 5.0 * math.sqrt(variance)
-        self._gross[source] = self._gross.get(source, 0) + 1 if gross else 0
-        if gross and self._gross[source] < _GROSS_IN_A_ROW:
+        total = prior + noise
+        gap = wrap_angle(heading_rad - turned - heading.offset_rad)
+        if abs(gap) > _LARGEST_STEP_RAD_S * span_s + 5.0 * math.sqrt(total):
+            heading.wrong_in_a_row += 1
+            if heading.wrong_in_a_row >= _WRONG_IN_A_ROW:
+                del self._headings[source]
             return
-        self._last_fix[source] = here
-        if gross:
-            return
-        step = config.zero_step_rad_s * span_s
-        for sign in (1.0, -1.0):
-            added = (sign * gap * step - 0.5 * step * step) / variance
-            added = min(max(added, -_PAIR_CAP), _PAIR_CAP)
-            if sign > 0.0:
-                self._left = max(0.0, self._left + added)
-            else:
-                self._right = max(0.0, self._right + added)
-        if max(self._left, self._right) > self.threshold:
-            off = math.degrees(gap / span_s)
-            self._find(
-                "imu_shifted", f"fixes turn by {off:+.2f} deg/s more than the gyro says: its zero moved"
-            )
+        gain = prior / total
+        bound = _BELIEVED_SIGMAS * math.sqrt(total)
+        gap = min(max(gap, -bound), bound)
+        heading.stamp_ns, heading.turned_rad, heading.wrong_in_a_row = stamp_ns, turned, 0
+        heading.offset_rad += gain * gap
+        heading.variance = (1.0 - gain) * prior
+        for lean, sign in zip(heading.leans, (1.0, -1.0), strict=True):
+            lean.add(gap, sign * config.zero_step_rad_s * span_s, total, gain)
+            if lean.evidence > self.threshold:
+                off = "more" if sign > 0.0 else "less"
+                least = math.degrees(config.zero_step_rad_s / 2.0)
+                self._find(
+                    "imu_shifted",
+                    f"fixes turn by {least:.2f} deg/s {off} than the gyro says, or farther: its zero moved",
+                )
 
     def account(
         self, source: str, *, used: bool, reason: str, innovation: tuple[float, float, float], nis: float
@@ -246,6 +277,10 @@ class ImuConsistency:
         share = (stamp_ns - before[0]) / (after[0] - before[0])
         return before[1] + share * (after[1] - before[1])
 
+    def _leans(self, source: str) -> bool:
+        heading = self._headings.get(source)
+        return heading is not None and any(lean.evidence > 0.5 * self.threshold for lean in heading.leans)
+
     @staticmethod
     def _keep(sums: _Source, innovation: tuple[float, float, float]) -> None:
         if all(map(math.isfinite, innovation)):
@@ -258,7 +293,7 @@ class ImuConsistency:
         square = len(kept) * sum(each[0] ** 2 + each[1] ** 2 for each in kept)
         leaning = square > 0.0 and x * x + y * y > _COHERENT * square
         sums.refused = sums.scatter = 0.0
-        if max(self._left, self._right) > 0.5 * self.threshold:
+        if self._leans(source):
             self._find("imu_shifted", f"{what}, and headings lean: the gyro's zero moved")
         elif leaning:
             mean = 1e3 * math.hypot(x, y) / len(kept)

@@ -10,11 +10,13 @@ from groundstation.control.vehicle import VehicleModel
 from groundstation.supervision.finding import Finding
 from groundstation.supervision.thrust_blocks import Block, ThrustBlocks
 from groundstation.supervision.thrust_fit import FitConfig, Misfit, ThrustFit
-from groundstation.supervision.valve_hypotheses import Kind, Suspicion, ValveSuspicions
+from groundstation.supervision.valve_hypotheses import BY_ITSELF, Kind, Suspicion, ValveSuspicions
 
 PUSHED_HOLDS_NS = 2_000_000_000
 _SURE = 7.0
 """Of two cases the better one is named alone when it is e^7 = 1100 times as likely."""
+_DOUBTED = 3.0
+"""A block is not learned from while a fault is that likely; a weak valve is what learning is to find out."""
 _UNEXPLAINED_CHANCE = (0.01, 0.9)
 """Of a block that no valve explains: of a healthy flight, and of one that is being pushed."""
 _OF_COMMANDED = 0.35
@@ -23,8 +25,8 @@ _HARD_PUSH = 1.7
 _CALM_BLOCKS = 10
 _LONGEST_PUSH_BLOCKS = 50
 """After a shock valves are not accused while forces go on, but not for longer than this."""
-_TURN_KNOWN = 4.0
-"""The gyro has a say when it would have given this much evidence."""
+_TURN_KNOWN = 8.0
+"""The gyro has a say about thrust not commanded when it would have given this much evidence."""
 _IS_CONSTANT = 0.95
 
 
@@ -175,8 +177,9 @@ class ValveConsistency:
         worst = max(self._suspicions.cases, key=_evidence)
         if worst.evidence >= self.threshold:
             self._judge(stamp_ns)
-        elif worst.evidence < _SURE:
-            self._waited = 0
+            return
+        self._waited = 0
+        if worst.evidence < (_SURE if worst.kind is Kind.WEAK else _DOUBTED):
             self._fit.learn(block, misfit)
 
     def _push(self, stamp_ns: int, change_m_s: float, what: str) -> None:
@@ -215,13 +218,22 @@ class ValveConsistency:
         cases = [case for case in self._suspicions.cases if case.evidence >= 0.5 * self.threshold]
         best = max(cases, key=_unbounded)
         rivals = [case for case in cases if case.unbounded > best.unbounded - _SURE]
+        by_itself = best.kind in BY_ITSELF
+        if by_itself:
+            # how much thrust is open, its direction is not: a half-open block must not favour small levers
+            alike = [case for case in cases if case.kind in BY_ITSELF]
+            best = max(alike, key=self._suspicions.direction)
+            least = self._suspicions.direction(best) - _SURE
+            rivals = [case for case in rivals if case.kind not in BY_ITSELF]
+            rivals += [case for case in alike if self._suspicions.direction(case) > least]
         self._waited += 1
         is_clear = len({case.valve for case in rivals}) == 1 and best.evidence >= self.threshold
-        if self._waited * self._config.block_s < self._config.wait_s:
-            if not is_clear or best.turning < _TURN_KNOWN:
-                return
+        if by_itself and best.turning < _TURN_KNOWN:
+            is_clear = False  # it may be a hand
+        if not is_clear and self._waited * self._config.block_s < self._config.wait_s:
+            return
         self._waited = 0
-        turns_otherwise = best.turning >= _TURN_KNOWN and best.by_rate < 0.0
+        turns_otherwise = by_itself and best.turning >= _TURN_KNOWN and best.by_rate < -0.5 * best.turning
         if turns_otherwise or not self._suspicions.is_along(best):
             size = math.hypot(best.residual_x, best.residual_y) / max(1, best.blocks)
             self._push(stamp_ns, size * self._config.block_s, "a force that is no valve's")

@@ -17,12 +17,13 @@ WEAK_GAIN = 0.5
 HEALTHY_GAIN = 0.8
 """A valve that was better and is now this good is still called healthy."""
 LEAK_SHARE = 0.15
-OPEN_CHANCE = 0.05
-"""Of a block that a valve which opens by itself is open: little, so that short openings add up, too."""
+OPENS_CHANCE, STAYS_CHANCE = 0.02, 0.95
+"""Of a valve which opens by itself: that it does so in a block, and that it is still open in the next."""
+DIRECTION_SIGMA_RAD = 0.06
+"""Of what the accelerometers read of a valve: 5 mm of the centre of mass, or of the IMU's place."""
 BLOCK_CAP = 8.0
 LEAK_CAP = 1.0
 """A leak stands for small forces that last: half a second of them, not three blocks."""
-_NEVER = -50.0
 
 
 class Kind(Enum):
@@ -32,6 +33,10 @@ class Kind(Enum):
     WEAK = "valve_weak"
     OPEN = "valve_stuck_open"
     LEAK = "leak"
+
+
+BY_ITSELF = frozenset((Kind.OPEN, Kind.LEAK))
+"""Thrust that was not commanded."""
 
 
 @dataclass(slots=True)
@@ -51,6 +56,7 @@ class Suspicion:
         turning: What the gyro would have given for the case if it were true; minus that if nothing turned.
         rate_rad_s: By how much the expected rate would be off now.
         amplitude: Of the block before, as the gyro felt it.
+        is_on: Chance that the valve was open in the block before, where it opens by itself.
     """
 
     kind: Kind
@@ -66,12 +72,13 @@ class Suspicion:
     turning: float = 0.0
     rate_rad_s: float = 0.0
     amplitude: float = 0.0
+    is_on: float = 0.0
 
     def drop(self) -> None:
         """Forget the case."""
         self.evidence = self.unbounded = self.thrust_s = 0.0
         self.residual_x = self.residual_y = self.variance = 0.0
-        self.by_rate = self.turning = self.rate_rad_s = self.amplitude = 0.0
+        self.by_rate = self.turning = self.rate_rad_s = self.amplitude = self.is_on = 0.0
         self.blocks = 0
 
 
@@ -115,8 +122,10 @@ class ValveSuspicions:
                 if kind is Kind.OPEN:
                     if is_calm and case.evidence <= 0.0:
                         continue
-                    chance = OPEN_CHANCE
-                    amplitude, turning = 1.0 - block.open_shares[valve], 1.0 - block.rate_shares[valve]
+                    chance = OPENS_CHANCE + (STAYS_CHANCE - OPENS_CHANCE) * case.is_on
+                    gain = fit.gains[valve]
+                    amplitude = gain * (1.0 - block.open_shares[valve])
+                    turning = gain * (1.0 - block.rate_shares[valve])
                 else:
                     cap = LEAK_CAP
                     amplitude = LEAK_SHARE * (1.0 - block.open_shares[valve])
@@ -134,11 +143,8 @@ class ValveSuspicions:
             weight = 1.0
             if chance < 1.0:
                 still = (misfit.rate_rad_s * idle - 0.5 * idle * idle) / misfit.rate_variance
-                on = chance * math.exp(max(added, _NEVER))
-                off = (1.0 - chance) * math.exp(max(min(cap, still), _NEVER))
-                added = math.log(on + off)
-                weight = on / (on + off)
-                whole = max(whole + math.log(chance), still + math.log(1.0 - chance))
+                added, weight = _mixed(min(cap, still), added, chance)
+                whole, _ = _mixed(still, whole, chance)
                 by_rate = weight * by_rate + (1.0 - weight) * still
             if case.evidence + added <= 0.0:
                 if case.evidence > 0.0:
@@ -158,7 +164,16 @@ class ValveSuspicions:
             left = 1.0 - misfit.rate_gain
             case.rate_rad_s = left * (weight * moved + (1.0 - weight) * idle)
             case.amplitude = weight * turning
+            case.is_on = weight
         return spoke
+
+    def direction(self, case: Suspicion) -> float:
+        """Log-likelihood of the direction of what the case explains, whatever its size, and of the turning."""
+        sx, sy, _ = self._fit.signatures[case.valve]
+        size = self._fit.sizes[case.valve]
+        along = (case.residual_x * sx + case.residual_y * sy) / size
+        across = (case.residual_x * sy - case.residual_y * sx) / size
+        return case.by_rate - 0.5 * across * across / (case.variance + (DIRECTION_SIGMA_RAD * along) ** 2)
 
     def is_along(self, case: Suspicion) -> bool:
         """Whether what the case explains points where its valve pushes."""
@@ -167,3 +182,17 @@ class ValveSuspicions:
         along = abs(case.residual_x * sx + case.residual_y * sy) / size
         across = abs(case.residual_x * sy - case.residual_y * sx) / size
         return across <= 0.35 * along + 3.0 * math.sqrt(case.variance)
+
+
+def _mixed(off: float, on: float, chance: float) -> tuple[float, float]:
+    """Log-likelihood ratio of a block that is on with that chance, and the chance after it.
+
+    Args:
+        off: Log-likelihood ratio if it is off.
+        on: Likewise if it is on.
+        chance: Before the block, between 0 and 1.
+    """
+    off, on = off + math.log(1.0 - chance), on + math.log(chance)
+    high, low = max(off, on), min(off, on)
+    total = high + math.log1p(math.exp(low - high))
+    return total, math.exp(on - total)
