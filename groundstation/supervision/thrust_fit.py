@@ -5,6 +5,7 @@ and the closing delay that all valves share. The bounds are those of healthy par
 learned away.
 """
 
+import math
 from dataclasses import dataclass
 
 from groundstation.control.vehicle import VehicleModel
@@ -102,7 +103,7 @@ class ThrustFit:
                     turn,
                 )
             )
-        self.sizes = [(x * x + y * y) ** 0.5 for x, y, _ in self.signatures]
+        self.sizes = [math.hypot(x, y) for x, y, _ in self.signatures]
         count = len(self.signatures)
         self.gains = [1.0] * count
         self._gain_variances = [config.gain_sigma**2] * count

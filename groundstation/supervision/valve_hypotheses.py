@@ -91,8 +91,12 @@ class ValveSuspicions:
 
     def __init__(self, fit: ThrustFit) -> None:
         self._fit = fit
-        self.cases = [Suspicion(kind, valve) for kind in Kind for valve in range(len(fit.gains))]
-        self._least_size = 0.5 * min(fit.sizes)
+        self._halves = [0.5 * size**2 for size in fit.sizes]
+        self._of_valve = [
+            tuple(Suspicion(kind, valve) for kind in (Kind.CLOSED, Kind.WEAK, Kind.OPEN, Kind.LEAK))
+            for valve in range(len(fit.gains))
+        ]
+        self.cases = [case for of_valve in self._of_valve for case in of_valve]
 
     def drop(self) -> None:
         """Forget every case."""
@@ -101,79 +105,102 @@ class ValveSuspicions:
 
     def weigh(self, block: Block, misfit: Misfit) -> bool:
         """Add a block to every case; whether it spoke for any of them."""
-        fit, span_s = self._fit, block.span_s
         x, y = misfit.force_m_s2
-        is_calm = x * x + y * y < self._least_size**2
+        by_turn = 0.5 * misfit.rate_rad_s**2 / misfit.rate_variance  # the most that the gyro can add
+        signatures, halves, gains = self._fit.signatures, self._halves, self._fit.gains
+        variance = misfit.force_variance
         spoke = False
-        for case in self.cases:
-            kind, valve = case.kind, case.valve
-            healthy = 0.0
-            chance = 1.0
-            cap = BLOCK_CAP
-            if kind is Kind.CLOSED or kind is Kind.WEAK:
-                share, turned = block.open_shares[valve], block.rate_shares[valve]
-                if share <= 0.0 and turned <= 0.0 and case.evidence <= 0.0:
-                    continue
-                gain = fit.gains[valve]
-                factor = (0.0 if kind is Kind.CLOSED else WEAK_GAIN) - gain
-                amplitude, turning = factor * share, factor * turned
+        for valve, share in enumerate(block.open_shares):
+            turned = block.rate_shares[valve]
+            sx, sy, _ = signatures[valve]
+            along, half, gain = sx * x + sy * y, halves[valve], gains[valve]
+            closed, weak, opened, leak = self._of_valve[valve]
+            for case, whole in ((opened, gain), (leak, LEAK_SHARE)):
+                amplitude = whole * (1.0 - share)
+                by_force = (along - half * amplitude) * amplitude / variance
+                if case.evidence > 0.0 or by_force + by_turn > 0.0:
+                    spoke |= self._add(
+                        case, block, misfit, (amplitude, whole * (1.0 - turned)), by_force, by_force
+                    )
+            if share > 0.0 or turned > 0.0 or closed.evidence > 0.0 or weak.evidence > 0.0:
                 healthy = min(0.0, HEALTHY_GAIN - gain) * share
-            else:
-                if kind is Kind.OPEN:
-                    if is_calm and case.evidence <= 0.0:
-                        continue
-                    chance = OPENS_CHANCE + (STAYS_CHANCE - OPENS_CHANCE) * case.is_on
-                    gain = fit.gains[valve]
-                    amplitude = gain * (1.0 - block.open_shares[valve])
-                    turning = gain * (1.0 - block.rate_shares[valve])
-                else:
-                    cap = LEAK_CAP
-                    amplitude = LEAK_SHARE * (1.0 - block.open_shares[valve])
-                    turning = LEAK_SHARE * (1.0 - block.rate_shares[valve])
-            sx, sy, st = fit.signatures[valve]
-            along = sx * x + sy * y
-            squared = 0.5 * fit.sizes[valve] ** 2
-            by_force = (along - squared * amplitude) * amplitude / misfit.force_variance
-            doubted = by_force - (along - squared * healthy) * healthy / misfit.force_variance
-            idle = case.rate_rad_s + 0.5 * case.amplitude * st * span_s
-            moved = idle + 0.5 * turning * st * span_s
-            by_rate = (misfit.rate_rad_s * moved - 0.5 * moved * moved) / misfit.rate_variance
-            whole = by_force + by_rate
-            added = min(cap, min(BLOCK_CAP, doubted) + by_rate)
-            weight = 1.0
-            if chance < 1.0:
-                still = (misfit.rate_rad_s * idle - 0.5 * idle * idle) / misfit.rate_variance
-                added, weight = _mixed(min(cap, still), added, chance)
-                whole, _ = _mixed(still, whole, chance)
-                by_rate = weight * by_rate + (1.0 - weight) * still
-            if case.evidence + added <= 0.0:
-                if case.evidence > 0.0:
-                    case.drop()
-                continue
-            spoke = spoke or added > 0.0
-            case.evidence += added
-            case.unbounded += whole
-            case.blocks += 1
-            case.thrust_s += abs(weight * amplitude) * span_s
-            if amplitude:
-                case.residual_x += weight * x
-                case.residual_y += weight * y
-                case.variance += weight * misfit.force_variance
-            case.by_rate += by_rate
-            case.turning += 0.5 * (weight * moved + (1.0 - weight) * idle) ** 2 / misfit.rate_variance
-            left = 1.0 - misfit.rate_gain
-            case.rate_rad_s = left * (weight * moved + (1.0 - weight) * idle)
-            case.amplitude = weight * turning
-            case.is_on = weight
+                usual = (along - half * healthy) * healthy / variance
+                for case, left in ((closed, 0.0), (weak, WEAK_GAIN)):
+                    amplitude = (left - gain) * share
+                    by_force = (along - half * amplitude) * amplitude / variance
+                    if case.evidence > 0.0 or by_force - usual + by_turn > 0.0:
+                        spoke |= self._add(
+                            case,
+                            block,
+                            misfit,
+                            (amplitude, (left - gain) * turned),
+                            by_force,
+                            by_force - usual,
+                        )
         return spoke
 
+    def _add(
+        self,
+        case: Suspicion,
+        block: Block,
+        misfit: Misfit,
+        amplitudes: tuple[float, float],
+        by_force: float,
+        over_healthy: float,
+    ) -> bool:
+        """Add a block to a case; whether it spoke for it.
+
+        Args:
+            case: Which.
+            block: The block.
+            misfit: Its residuals.
+            amplitudes: Thrust too much by it, over full thrust: as accelerometers and gyro feel it.
+            by_force: Log-likelihood ratio of the force to what is expected.
+            over_healthy: Likewise to the worst valve that is still called healthy.
+        """
+        amplitude, turning = amplitudes
+        cap = LEAK_CAP if case.kind is Kind.LEAK else BLOCK_CAP
+        step = 0.5 * self._fit.signatures[case.valve][2] * block.span_s
+        idle = case.rate_rad_s + case.amplitude * step
+        moved = idle + turning * step
+        by_rate = (misfit.rate_rad_s - 0.5 * moved) * moved / misfit.rate_variance
+        whole = by_force + by_rate
+        added = min(cap, min(BLOCK_CAP, over_healthy) + by_rate)
+        weight = 1.0
+        if case.kind is Kind.OPEN:
+            chance = OPENS_CHANCE + (STAYS_CHANCE - OPENS_CHANCE) * case.is_on
+            still = (misfit.rate_rad_s - 0.5 * idle) * idle / misfit.rate_variance
+            added, weight = _mixed(min(cap, still), added, chance)
+            whole, _ = _mixed(still, whole, chance)
+            by_rate = weight * by_rate + (1.0 - weight) * still
+            moved = weight * moved + (1.0 - weight) * idle
+        if case.evidence + added <= 0.0:
+            if case.evidence > 0.0:
+                case.drop()
+            return False
+        case.evidence += added
+        case.unbounded += whole
+        case.blocks += 1
+        case.thrust_s += abs(weight * amplitude) * block.span_s
+        if amplitude:
+            case.residual_x += weight * misfit.force_m_s2[0]
+            case.residual_y += weight * misfit.force_m_s2[1]
+            case.variance += weight * misfit.force_variance
+        case.by_rate += by_rate
+        case.turning += 0.5 * moved * moved / misfit.rate_variance
+        case.rate_rad_s = (1.0 - misfit.rate_gain) * moved
+        case.amplitude = weight * turning
+        case.is_on = weight
+        return added > 0.0
+
     def direction(self, case: Suspicion) -> float:
-        """Log-likelihood of the direction of what the case explains, whatever its size, and of the turning."""
+        """Log-likelihood of where the thrust of the case points, whatever its size, and of its turning."""
         sx, sy, _ = self._fit.signatures[case.valve]
         size = self._fit.sizes[case.valve]
         along = (case.residual_x * sx + case.residual_y * sy) / size
         across = (case.residual_x * sy - case.residual_y * sx) / size
-        return case.by_rate - 0.5 * across * across / (case.variance + (DIRECTION_SIGMA_RAD * along) ** 2)
+        variance = case.variance + (DIRECTION_SIGMA_RAD * along) ** 2
+        return case.by_rate - 0.5 * across * across / variance
 
     def is_along(self, case: Suspicion) -> bool:
         """Whether what the case explains points where its valve pushes."""

@@ -1,10 +1,9 @@
-"""A floating mock-up of these tests' own: pulses in, IMU samples out; independent of the firmware emulator."""
+"""A floating mock-up of these tests' own: pulses in, IMU samples out; not the firmware emulator's."""
 
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
-import pytest
 
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 
@@ -79,7 +78,7 @@ def commands(rng, periods, truth, busy=0.6):
     return chosen
 
 
-def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, pulses_seen=None):
+def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4):
     """Feed a detector with what was commanded and felt; yields (time in s, findings) where they change."""
     steps = chosen.shape[0] * PERIOD_MS
     felt = np.zeros((steps, 8))
@@ -121,7 +120,7 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, pulses_seen
         wrench[int(first) : int(last), 1] += fy
     turn = wrench[:, 2] / (MODEL.inertia_kg_m2 * truth.inertia)
     rate = np.cumsum(turn) * 1e-3
-    rate -= lagged(rate, 3000.0)  # somebody steers: slow turning is taken away
+    rate -= lagged(rate, 60_000.0)  # whoever steers takes out what adds up over minutes
     arm = np.array(ARM_M) - truth.centre_m
     force = wrench[:, :2] / (MODEL.mass_kg * truth.mass)
     force[:, 0] += -turn * arm[1] - rate**2 * arm[0] + truth.zero[0]
