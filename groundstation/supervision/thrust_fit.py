@@ -13,6 +13,7 @@ from groundstation.supervision.thrust_blocks import Block
 
 _SHUT = 0.02  # a sum of shares below this is no thrust worth learning from
 _WELL_OPEN = 0.3
+_ZERO_KNOWN_M_S2 = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +66,6 @@ class Misfit:
         rate_variance: Of it.
         rate_gain: Share of the rate's residual that is believed before the next block.
         commanded_m_s2: Sum of what the commanded valves push, each by itself.
-        share_before: Of each valve in the block before, as the gyro feels it.
     """
 
     force_m_s2: tuple[float, float]
@@ -74,7 +74,6 @@ class Misfit:
     rate_variance: float
     rate_gain: float
     commanded_m_s2: float
-    share_before: list[float]
 
 
 class ThrustFit:
@@ -128,6 +127,11 @@ class ThrustFit:
         self._zero = (self._zero[0] + step_m_s2[0], self._zero[1] + step_m_s2[1])
         self._zero_variance = self._config.zero_sigma_m_s2**2
 
+    @property
+    def knows_zero(self) -> bool:
+        """Whether a small force that lasts is no longer the accelerometers' unknown zero."""
+        return self._zero_variance < _ZERO_KNOWN_M_S2**2
+
     def lose_rate(self) -> None:
         """Take the next block's rate as it is: something turned the vehicle that was no valve."""
         self._rate_variance = float("inf")
@@ -178,10 +182,10 @@ class ThrustFit:
         """Carry the rate on and compare it."""
         config, span_s = self._config, block.span_s
         noise = config.gyro_density_rad_s_rthz**2 / span_s
-        share_before, self._share_before = self._share_before, block.rate_shares
+        self._share_before = block.rate_shares
         if self._rate_variance == float("inf") or block.is_after_gap:
             self._rate, self._rate_variance = block.rate_rad_s, noise
-            return Misfit(force, variance, 0.0, noise, 1.0, commanded, share_before)
+            return Misfit(force, variance, 0.0, noise, 1.0, commanded)
         expected = self._rate + turn * span_s
         prior = self._rate_variance + (turn_variance + config.turn_floor_rad_s2**2) * span_s**2
         total = prior + noise
@@ -189,20 +193,20 @@ class ThrustFit:
         residual = block.rate_rad_s - expected
         self._rate = expected + gain * residual
         self._rate_variance = (1.0 - gain) * prior
-        return Misfit(force, variance, residual, total, gain, commanded, share_before)
+        return Misfit(force, variance, residual, total, gain, commanded)
 
     def learn(self, block: Block, misfit: Misfit) -> None:
         """Take a block that nothing speaks against."""
         config, span_s, total = self._config, block.span_s, misfit.force_variance
         x, y = misfit.force_m_s2
         self._zero_variance += config.zero_walk_m_s2_rts**2 * span_s
+        share = self._zero_variance / total
+        self._zero = (
+            _within(self._zero[0] + share * x, self._given_zero[0], config.zero_bound_m_s2),
+            _within(self._zero[1] + share * y, self._given_zero[1], config.zero_bound_m_s2),
+        )
+        self._zero_variance *= 1.0 - share
         if sum(block.open_shares) < _SHUT:
-            share = self._zero_variance / total
-            self._zero = (
-                _within(self._zero[0] + share * x, self._given_zero[0], config.zero_bound_m_s2),
-                _within(self._zero[1] + share * y, self._given_zero[1], config.zero_bound_m_s2),
-            )
-            self._zero_variance *= 1.0 - share
             return
         end_x = end_y = 0.0
         for valve, share in enumerate(block.open_shares):

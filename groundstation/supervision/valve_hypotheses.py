@@ -110,12 +110,13 @@ class ValveSuspicions:
         signatures, halves, gains = self._fit.signatures, self._halves, self._fit.gains
         variance = misfit.force_variance
         spoke = False
+        uncommanded = 2 if self._fit.knows_zero else 1
         for valve, share in enumerate(block.open_shares):
             turned = block.rate_shares[valve]
             sx, sy, _ = signatures[valve]
             along, half, gain = sx * x + sy * y, halves[valve], gains[valve]
             closed, weak, opened, leak = self._of_valve[valve]
-            for case, whole in ((opened, gain), (leak, LEAK_SHARE)):
+            for case, whole in ((opened, gain), (leak, LEAK_SHARE))[:uncommanded]:
                 amplitude = whole * (1.0 - share)
                 by_force = (along - half * amplitude) * amplitude / variance
                 if case.evidence > 0.0 or by_force + by_turn > 0.0:

@@ -1,9 +1,11 @@
 """A floating mock-up of these tests' own: pulses in, IMU samples out; not the firmware emulator's."""
 
 import math
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 
@@ -78,8 +80,11 @@ def commands(rng, periods, truth, busy=0.6):
     return chosen
 
 
-def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4):
-    """Feed a detector with what was commanded and felt; yields (time in s, findings) where they change."""
+def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None):
+    """Feed a detector with what was commanded and felt; yields (time in s, findings) where they change.
+
+    The detector numbers its valves by `order`, if one is given.
+    """
     steps = chosen.shape[0] * PERIOD_MS
     felt = np.zeros((steps, 8))
     start = np.arange(chosen.shape[0]) * PERIOD_MS
@@ -137,7 +142,8 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4):
     rates = rate[: count * period_ms].reshape(count, -1).mean(1).tolist()
     forces = force[: count * period_ms].reshape(count, -1, 2).mean(1).tolist()
     window_s = period_ms * 1e-3
-    period, rows = -1, [bytes(row) for row in chosen.tolist()]
+    ordered = chosen if order is None else chosen[:, order]
+    period, rows = -1, [bytes(row) for row in ordered.tolist()]
     for sample in range(count):
         end_ms = (sample + 1) * period_ms
         while (period + 1) * PERIOD_MS < end_ms:
@@ -168,3 +174,9 @@ def make_detector(noise=DEFAULT, model=MODEL, arm=ARM_M):
         acc_density_m_s2_rthz=noise["acc"],
     )
     return ValveConsistency(model, ValveConsistencyConfig(fit=fit, acc_lag_s=lag[0], gyro_lag_s=lag[1]))
+
+
+@pytest.fixture
+def air():
+    """This module: mock-ups, how they fly, and a detector for them."""
+    return sys.modules[__name__]
