@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from groundstation.frames import wrap_angle
 from groundstation.supervision.finding import Finding
+from groundstation.supervision.heading_lean import Heading
 
 OUTSIDE = "outside the gate"
 RESTARTED = "starts the estimate again"
@@ -54,7 +55,6 @@ class ImuConsistencyConfig:
     fixes: float = 540_000.0
 
 
-_FIX_CAP = 4.0
 _BELIEVED_SIGMAS = 3.0
 """One fix proves nothing, however far off: it may be wrong."""
 _LONGEST_GAP_S = 2.0
@@ -73,36 +73,6 @@ class _Source:
     run: int = 0
     scatter: float = 0.0
     innovations: list[tuple[float, float, float]] = field(default_factory=list)
-
-
-@dataclass(slots=True)
-class _Lean:
-    """The case that the gyro's zero jumped by a stated step, to one side."""
-
-    evidence: float = 0.0
-    offset_rad: float = 0.0  # by how much the expected heading would be off by now
-
-    def add(self, gap_rad: float, moved_rad: float, variance: float, gain: float) -> None:
-        """Take a fix: its innovation and variance, and what the step turns since the fix before."""
-        offset = self.offset_rad + moved_rad
-        added = min(_FIX_CAP, (gap_rad - 0.5 * offset) * offset / variance)
-        if self.evidence + added <= 0.0:
-            self.evidence = self.offset_rad = 0.0
-            return
-        self.evidence += added
-        self.offset_rad = (1.0 - gain) * offset
-
-
-@dataclass(slots=True)
-class _Heading:
-    """What fixes say beyond the turn by the gyro: constant, but for noise."""
-
-    stamp_ns: int
-    turned_rad: float
-    offset_rad: float
-    variance: float
-    wrong_in_a_row: int = 0
-    leans: tuple[_Lean, _Lean] = field(default_factory=lambda: (_Lean(), _Lean()))
 
 
 class ImuConsistency:
@@ -129,7 +99,7 @@ class ImuConsistency:
         self._found: dict[str, Finding] = {}
         self._turned_rad = 0.0
         self._turns: list[tuple[int, float]] = []  # stamp, turn since the start by the gyro
-        self._headings: dict[str, _Heading] = {}
+        self._headings: dict[str, Heading] = {}
         self._zeros: list[tuple[int, float, float, float]] = []
 
     @property
@@ -168,7 +138,7 @@ class ImuConsistency:
             return
         heading = self._headings.get(source)
         if heading is None or not 0.0 < (span_s := (stamp_ns - heading.stamp_ns) * 1e-9) < _LONGEST_GAP_S:
-            self._headings[source] = _Heading(stamp_ns, turned, heading_rad - turned, math.inf)
+            self._headings[source] = Heading(stamp_ns, turned, heading_rad - turned, math.inf)
             return
         config = self._config
         by_gyro = turned - heading.turned_rad

@@ -131,6 +131,8 @@ class ValveConsistency:
             rate_rad_s: Turn rate, zero removed to some 0.01 rad/s.
             force_m_s2: Specific force x, y as measured, body axes; `start` was given its zero.
         """
+        if not (math.isfinite(rate_rad_s) and all(map(math.isfinite, force_m_s2))):
+            return False  # a hole in the samples; a sum with it would never be a number again
         block = self._blocks.sample(stamp_ns, window_s, rate_rad_s, force_m_s2)
         if block is None:
             return False

@@ -248,3 +248,13 @@ def test_findings_stay_until_they_are_reset(air):
 def test_the_threshold_is_that_of_the_wanted_false_alarms(air):
     # 33 tests, 10 h of blocks of 20 ms, one false alarm in a hundred such flights
     assert air.make_detector().threshold == pytest.approx(np.log(33 * 36_000 / 0.02 / 0.01))
+
+
+def test_a_sample_that_is_no_number_is_a_hole_and_spoils_nothing(air):
+    rng = np.random.default_rng(1)
+    truth = air.Truth.drawn(rng, open={2: (3000.0, 1.0)})
+    detector = air.make_detector()
+    assert not detector.sample(10 * MS, 0.01, np.nan, (0.0, 0.0))
+    assert not detector.sample(20 * MS, 0.01, 0.0, (0.0, np.inf))
+    found = list(air.fly(detector, rng, truth, air.commands(rng, 60, truth), period_ms=10))
+    assert [each.id for each in found[0][1]] == ["valve_stuck_open"]
