@@ -132,7 +132,7 @@ FAULTS: Mapping[str, Fault] = {
               "Connect the right block, or correct the rig.", ("other_imu",)),
         Fault("imu_shifted", "A zero offset of the IMU has stepped.",
               "fixes that contradict the IMU one-sidedly, or an offset beyond what it may be", 1.0,
-              ((0.0, _LAND),), _PERSON, True, True,
+              ((0.0, _LAND), (2.0, _CUT)), _PERSON, True, True,
               "Calibrate the block at rest again.", ("shifted_imu",)),
         Fault("imu_clock_jumped", "The tick counter of the IMU block has jumped.",
               "ticks against arrivals", 0.5,
@@ -143,7 +143,7 @@ FAULTS: Mapping[str, Fault] = {
         # -- what pushes it -------------------------------------------------------------------------
         Fault("valve_stuck_open", "A valve pushes that nobody opened.",
               "acceleration against the commands", 2.0,
-              ((0.0, _LAND),), _PERSON, True, False, "Clean or replace the valve.",
+              ((0.0, _LAND), (3.0, _CUT)), _PERSON, True, False, "Clean or replace the valve.",
               ("stuck_open_valve", "leaking_valve", "pulsing_valve")),
         Fault("valve_stuck_closed", "A valve does not push when it is opened.",
               "acceleration against the commands", 1.0,

@@ -177,7 +177,7 @@ class SupervisorNode(Node):
             tuple(float(row.since_ns) for row in rows),
             tuple(row.response.words for row in rows),
             tuple(row.fault.advice for row in rows),
-            tuple(float(row.is_there) for row in rows),
+            tuple(0.0 if row.is_there else float(row.seen_ns) for row in rows),
         )
 
 

@@ -194,9 +194,9 @@ def test_faults_are_shown_until_they_clear_and_are_events(watched):
     more = {"since_ns": (0.0,), "responses": ("brakes, then lands",), "advices": ("Fill it.",)}
     watched.give(Faults, 1)
     assert watched.row("faults") == "none"
-    watched.give(Faults, 2, **row, **more, there=(1.0,))
+    watched.give(Faults, 2, **row, **more, gone_ns=(0.0,))
     assert watched.row("faults") == "tank_low (2 s, brakes, then lands)"
-    watched.give(Faults, 3, **row, **more, there=(0.0,))
+    watched.give(Faults, 3, **row, **more, gone_ns=(2e9,))
     assert watched.row("faults") == "tank_low (gone, release clears it)"
     watched.give(Faults, 4)
     assert watched.monitor.take_lines() == [
