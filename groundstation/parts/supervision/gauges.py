@@ -101,5 +101,11 @@ class FaultGauge(Gauge):
             shown.append(f"{fault} ({state})")
         return cell(", ".join(shown), Level.BAD)
 
+    def phrase(self, newest: Newest, now_ns: int) -> str:
+        del now_ns
+        faults = newest.get(Faults)
+        count = 0 if faults is None else len(faults.ids)
+        return f"{f'FAULTS {count}' if count else 'no faults':<9}"
+
 
 GAUGES = (GaugeRow(1, ModeGauge), GaugeRow(2, FaultGauge))

@@ -60,7 +60,8 @@ def fix(watched, second, reason=""):
 
 def test_the_rows_stand_in_their_order(watched):
     assert watched.monitor.vehicles["alpha"].labels() == (
-        "phase",
+        "mode",
+        "faults",
         "valves",
         "commanded by",
         "position, heading",
@@ -124,7 +125,7 @@ def test_the_line_of_a_log_has_fixed_columns(watched):
     watched.give(FusionStatus, 1, fixes_used=5, fixes_refused=1, fix_age_s=0.125)
     fix(watched, 1)
     assert watched.line() == (
-        "flying            open        1250.0   -500.0 mm   90.00 deg  off    4.0 mm   0.00 deg  "
+        "flying     no faults  armed       1250.0   -500.0 mm   90.00 deg  off    4.0 mm   0.00 deg  "
         "est  1.00 mm 0.000 deg  imu   0/s lost 2  fix  0.3/s age 0.12 s used 5 refused 1"
     )
     first = "position, heading"
@@ -139,9 +140,9 @@ def test_levels_say_what_is_bad(watched):
     watched.give(VehicleState, 1, status="lost")
     watched.give(Imu, 1, reason="frozen", frames_lost=3)
     cells = watched.cells()
-    assert cells["phase"].pieces == (("stopped", Level.BAD),)
+    assert cells["mode"].pieces == (("stopped (stopped, by operator)", Level.BAD),)
     assert cells["valves"].pieces == (
-        ("armed, stopped ", Level.WARNING),
+        ("stopped ", Level.WARNING),
         ("●·●·····", Level.PLAIN),
         (" dead man", Level.BAD),
     )

@@ -76,7 +76,7 @@ def test_rates_count_what_is_not_decoded_and_fall_to_zero(tables, message, deliv
 def test_the_record_stream_shows_what_delivered_messages_show(tables, message, delivered, recorded):
     streamed, direct = Monitor(tables, ("alpha",)), Monitor(tables, ("alpha",))
     payloads = [
-        message(Supervision, mode="flying"),
+        message(Supervision, mode="flying", cause="it floats"),
         message(VehicleState, position_table_m=(1.0, 2.0), status="flying", fix_stamp_ns=3),
         message(FusionStatus, fixes_used=4, fix_age_s=0.2),
         message(StarFix, reason="too few stars: 1", stamp_ns=3),
@@ -87,7 +87,7 @@ def test_the_record_stream_shows_what_delivered_messages_show(tables, message, d
         one = delivered(payload, number, 10 * number)
         streamed.take(recorded(one), number)
         direct.take_delivered(one, number)
-    assert streamed.take_lines() == direct.take_lines() == ["alpha: flying", "alpha/imu: gone"]
+    assert streamed.take_lines() == direct.take_lines() == ["alpha: flying (it floats)", "alpha/imu: gone"]
     assert streamed.vehicles["alpha"].rows(9) == direct.vehicles["alpha"].rows(9)
     assert streamed.vehicles["alpha"].line(9) == direct.vehicles["alpha"].line(9)
     assert streamed.summarise_latency(9)[0].p50_s[4] == pytest.approx(17e-9)  # the state
@@ -146,21 +146,21 @@ def test_garbled_messages_are_counted_and_reported_once_per_topic(tables, messag
     assert monitor.undecodable == 3
     lines = monitor.take_lines()
     assert [line.partition(" cannot")[0] for line in lines] == [
-        "a message on alpha/sequence_phase",
+        "a message on alpha/supervision",
         "a message on alpha/imu",
     ]
 
 
 class Shared(Gauge):
-    """Reports the same of a message for each vehicle, and fails on the phases ``fail`` and ``exit``."""
+    """Reports the same of a message for each vehicle, and fails on the modes ``fail`` and ``exit``."""
 
     label = "shared"
     every = (Diagnostics, Supervision)
 
     def take(self, message, now_ns):
-        yield f"{message.node} reports" if isinstance(message, Diagnostics) else "a phase"
+        yield f"{message.node} reports" if isinstance(message, Diagnostics) else "a mode"
         if getattr(message, "mode", "") == "fail":
-            raise RuntimeError("no such phase")
+            raise RuntimeError("no such mode")
         if getattr(message, "mode", "") == "exit":
             sys.exit("enough")
 
@@ -182,11 +182,11 @@ def test_what_all_vehicles_report_of_one_message_is_one_event(shared, message, d
 
 
 @pytest.mark.parametrize(
-    ("phase", "how"), [("fail", "RuntimeError: no such phase"), ("exit", "SystemExit: enough")]
+    ("mode", "how"), [("fail", "RuntimeError: no such mode"), ("exit", "SystemExit: enough")]
 )
-def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered, phase, how):
+def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered, mode, how):
     for number in range(3):
-        shared.take_delivered(delivered(message(Supervision, mode=phase), number), 0)
+        shared.take_delivered(delivered(message(Supervision, mode=mode), number), 0)
     assert shared.take_lines() == [f"alpha: Shared failed: {how}"]
     assert row(shared, "shared") == "failed"
     assert row(shared, "shared", vehicle="beta") == "fine"
