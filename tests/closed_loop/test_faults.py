@@ -140,9 +140,14 @@ def test_wrong_fixes_are_refused_and_counted(fly):
 
 
 @pytest.mark.parametrize("kind", ["stuck_open_valve", "stuck_closed_valve"])
-def test_the_other_valves_make_up_for_one_that_fails(fly, kind):
-    flight = fly(fault(kind, valve=0)).run(STOP_S)
-    assert_survived(flight)
+def test_a_valve_that_fails_is_named_and_lands_the_vehicle_until_a_person_lets_it_fly(fly, kind):
+    flight = fly(fault(kind, valve=0)).run(STOP_S + 8.0)
+    name = "valve_stuck_open" if kind == "stuck_open_valve" else "valve_stuck_closed"
+    assert name in flight.faults()
+    assert flight.modes()[-1] == "landed"
+    assert flight.off_goal()[0][-1] < 0.2
+    flight.request("fly")
+    assert flight.run(6.0).modes()[-1] == "flying"
 
 
 def test_a_silent_bus_closes_the_valves_and_the_vehicle_lands_when_it_speaks_again(fly):

@@ -8,7 +8,7 @@ from groundstation.declarations.node import Node
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.supervision.messages import Findings, Supervision
-from groundstation.parts.valves.messages import ValveCommand
+from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 from groundstation.supervision.fix_watch import FixWatch
 from groundstation.supervision.imu_consistency import ImuConsistency
 from groundstation.supervision.imu_watch import ImuWatch
@@ -16,6 +16,8 @@ from groundstation.supervision.valve_consistency import ValveConsistency
 
 PERIOD_NS = 50_000_000
 REPEAT_NS = 200_000_000
+NODE_NS = 70_000_000
+"""A node whose newest status is older may not have received the commands, which then explain nothing."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
 
@@ -31,7 +33,7 @@ class FaultDetector(Node):
     """
 
     inputs: tuple[type[Message], ...] = (
-        Imu, FixAccount, FusionStatus, ValveCommand, Supervision, PoseFix,
+        Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, PoseFix,
     )  # fmt: skip
     outputs = (Findings,)
 
@@ -43,7 +45,7 @@ class FaultDetector(Node):
         imu: ImuConsistency,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self.inputs = (Imu, FixAccount, FusionStatus, ValveCommand, Supervision, *fixes)
+        self.inputs = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, *fixes)
         self._sources = fixes
         self._imu_watch = ImuWatch()
         self._fix_watch = FixWatch()
@@ -51,6 +53,7 @@ class FaultDetector(Node):
         self._imu = imu
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
+        self._node_ns = 0
         self._published: tuple[str, ...] = ()
         self._published_ns = 0
 
@@ -62,6 +65,8 @@ class FaultDetector(Node):
             case ValveCommand():
                 if self._floats_from_ns is not None:
                     self._valves.command(now_ns, message.pulse_id, message.on_time_ms)
+            case ValveStatus():
+                self._node_ns = now_ns
             case PoseFix():
                 self._fix(message, now_ns)
             case FixAccount():
@@ -80,14 +85,14 @@ class FaultDetector(Node):
         return self._floats_from_ns is not None and now_ns >= self._floats_from_ns
 
     def _follow(self, ruling: Supervision, now_ns: int) -> None:
-        """The air comes on or goes; a person's release clears what was latched."""
+        """The air comes on or goes; what was found in a flight stays with the supervisor, not here."""
         if ruling.is_in_flight and self._floats_from_ns is None:
             self._floats_from_ns = now_ns + LIFTED_NS
+            self._valves.start(self._zeros[1])
+        elif not ruling.air_on and self._floats_from_ns is not None:
+            self._floats_from_ns = None
             self._valves.reset()
             self._imu.reset()
-            self._valves.start(self._zeros[1])
-        elif not ruling.air_on:
-            self._floats_from_ns = None
 
     def _sample(self, imu: Imu, now_ns: int) -> bool:
         self._imu_watch.take(
@@ -101,6 +106,10 @@ class FaultDetector(Node):
             return False
         rate_rad_s = imu.rate_body_rad_s - self._zeros[0]
         self._imu.sample(imu.stamp_ns, rate_rad_s)
+        if now_ns - self._node_ns > NODE_NS:
+            self._valves.reset()
+            self._valves.start(self._zeros[1])
+            return False
         return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
 
     def _fix(self, fix: PoseFix, now_ns: int) -> None:
