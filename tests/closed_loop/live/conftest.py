@@ -70,7 +70,11 @@ class Run:
     def __init__(self, rig, folder, *words):
         self.recording = folder / "run.mcap"
         self.folder = folder
-        self._env = os.environ | {"XDG_RUNTIME_DIR": str(folder), "OPENBLAS_NUM_THREADS": "1"}
+        self._env = os.environ | {
+            "XDG_RUNTIME_DIR": str(folder),
+            "XDG_STATE_HOME": str(folder),
+            "OPENBLAS_NUM_THREADS": "1",
+        }
         command = [sys.executable, "-m", "groundstation", "run", str(rig), "--headless"]
         self.process = subprocess.Popen(
             [*command, "--record", str(self.recording), *words],

@@ -22,7 +22,7 @@ def test_motion_capture_delivers_fixes_and_the_mock_up_flies_on_them(launch, tmp
     rig.write_text(RIG.read_text().replace("[vehicles.alpha]", short_rest, 1))
     run = launch(rig)
     for _ in range(3):
-        run.wait_for("alpha", "flying", "open")
+        run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     with Recording(run.recording) as recording:
         kinds = (CaptureFix, FixAccount, VehicleState, ReferenceState)
