@@ -9,7 +9,10 @@ KNOWN_INTERVALS = 3
 """So many intervals between fixes say how often they usually come."""
 PERIODS = 3.0
 LASTING_S = 1.0
+RARE_OVER_S, RARE_SHARE, OFTEN_HZ = 1.0, 0.6, 5.0
+"""Over so long fixes that usually come often come less than this share of their usual number."""
 REFUSED_IN_A_ROW = 8
+_INTERVALS = 9
 REPEATS, TORN = "repeat", "torn picture"
 """What the reasons of pictures and fixes hold."""
 
@@ -19,8 +22,10 @@ class FixWatch:
 
     def __init__(self) -> None:
         self._used_ns: int | None = None
-        self._intervals_s: deque[float] = deque(maxlen=9)
+        self._recent_ns: deque[int] = deque(maxlen=256)
+        self._intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self._refused = 0
+        self._usual_hz = 0.0
         self._marks: dict[str, tuple[int, str]] = {}
 
     def take_account(self, now_ns: int, *, is_used: bool, reason: str) -> None:
@@ -29,6 +34,7 @@ class FixWatch:
             if self._used_ns is not None:
                 self._intervals_s.append((now_ns - self._used_ns) * 1e-9)
             self._used_ns = now_ns
+            self._recent_ns.append(now_ns)
             self._refused = 0
         elif REPEATS in reason:
             self._marks["camera_frozen"] = now_ns, reason
@@ -57,3 +63,15 @@ class FixWatch:
         age_s = (now_ns - self._used_ns) * 1e-9
         if age_s > longest_s:
             yield "star_outage", f"no fix for {age_s:.1f} s"
+            return
+        yield from self._rarity(now_ns)
+
+    def _rarity(self, now_ns: int) -> Iterator[tuple[str, str]]:
+        while self._recent_ns and now_ns - self._recent_ns[0] > RARE_OVER_S * 1e9:
+            self._recent_ns.popleft()
+        if len(self._intervals_s) < _INTERVALS:
+            return
+        self._usual_hz = max(self._usual_hz, 1.0 / median(self._intervals_s))
+        found_hz = len(self._recent_ns) / RARE_OVER_S
+        if self._usual_hz >= OFTEN_HZ and found_hz < RARE_SHARE * self._usual_hz:
+            yield "fixes_rare", f"{found_hz:.0f} a second, usually {self._usual_hz:.0f}"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 SILENT_S = 0.15
 BAD_S = 0.1
 """So long in a row samples must be refused before it is a fault: one bad frame is noise."""
-JUMP_MS = 500
+JUMP_MS = 200
 """Ticks between two samples beyond what a line loses."""
 STUCK, OTHER_BLOCK = "stuck", "this is block"
 """What the reader's reasons hold."""

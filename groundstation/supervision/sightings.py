@@ -30,7 +30,15 @@ OVERHANG_M = 0.05
 REACTION_S = 0.15
 """Age of the state, a modulation period, the opening of a valve."""
 ONLY_ALOFT = frozenset(
-    {"star_outage", "wrong_fixes", "pushed", "valve_stuck_open", "valve_stuck_closed", "valve_weak"}
+    {
+        "star_outage",
+        "fixes_rare",
+        "wrong_fixes",
+        "pushed",
+        "valve_stuck_open",
+        "valve_stuck_closed",
+        "valve_weak",
+    }
 )
 """What is found by how it moves means nothing on the ground, where people lift it and friction holds it."""
 UNDERVOLTAGE = 1
@@ -56,7 +64,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class NodeSeen:
-    """The newest status of the valve node, as it arrived."""
+    """The newest status of the valve node, as it arrived, and how many frames a second its bus carries."""
 
     arrival_ns: int
     armed: bool
@@ -64,6 +72,7 @@ class NodeSeen:
     dead_man: bool
     pressure_pa: float
     faults: int
+    bus_rate_hz: float
 
 
 @dataclass(slots=True)
@@ -75,6 +84,7 @@ class Sightings:
         braking_m_s2: Deceleration to count on.
         radius_m: Of a mock-up.
         began_ns: When the supervisor began: nothing is silent before its time.
+        most_frames_hz: Frames a second of which the bus is flooded.
         own: The newest estimate; None before the first.
         others: Those of the other vehicles.
         leaders: Names of vehicles whose states its controller wants.
@@ -95,6 +105,7 @@ class Sightings:
     braking_m_s2: float
     radius_m: float
     began_ns: int
+    most_frames_hz: float = math.inf
     own: Seen | None = None
     others: dict[str, Seen] = field(default_factory=dict)
     leaders: tuple[str, ...] = ()
@@ -193,6 +204,8 @@ class Sightings:
             return
         if node.pressure_pa < LEAST_TANK_PA:  # NaN: it has no sensor
             yield "tank_low", f"{node.pressure_pa * 1e-5:.0f} bar"
+        if node.bus_rate_hz > self.most_frames_hz:
+            yield "can_flooded", f"{node.bus_rate_hz:.0f} frames a second"
         if node.faults & UNDERVOLTAGE:
             yield "battery_low", "the valve node reports undervoltage"
 

@@ -23,6 +23,8 @@ from groundstation.supervision.supervisor import Supervisor
 from groundstation.supervision.thrust_fit import FitConfig
 from groundstation.supervision.valve_consistency import ValveConsistency, ValveConsistencyConfig
 
+NODE_FRAMES_HZ, SPARE_FRAMES_HZ = 60.0, 100.0
+"""What a valve node sends a second, and what others may send besides."""
 RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
 HEADING_SIGMA_RAD = 0.002  # of fixes that are no camera's
 SLOPE_M_S2 = 0.005  # a table half a milliradian off level
@@ -36,6 +38,7 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
         braking_m_s2,
         MOCK_UP_RADIUS_M,
         began_ns=0,
+        most_frames_hz=2.0 * NODE_FRAMES_HZ * len(rig.vehicles) + SPARE_FRAMES_HZ,
         leaders=neighbours_of(rig, vehicle),
     )
     supervisor = Supervisor(

@@ -107,6 +107,7 @@ class SupervisorNode(Node):
                     message.dead_man,
                     message.pressure_pa,
                     message.faults,
+                    message.bus_rate_hz,
                 )
             case ValveDemand():
                 sightings.demand_ns = now_ns

@@ -107,6 +107,7 @@ class ValveStatus(Message):
         floating: The float air is on.
         pressure_pa: Tank pressure, NaN before the first report.
         faults: Fault bits.
+        bus_rate_hz: Frames that arrive from the bus, of all nodes together.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveStatus"
@@ -118,3 +119,4 @@ class ValveStatus(Message):
     floating: Bool
     pressure_pa: F64
     faults: U8
+    bus_rate_hz: F64

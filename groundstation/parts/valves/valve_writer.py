@@ -12,6 +12,8 @@ from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
 
 FLOAT_RETRY_NS = 100_000_000
+COUNTED_NS = 500_000_000
+"""Over so long frames are counted."""
 BUTTON_PAUSE_NS = 300_000_000
 """Stop frames that follow each other faster are one press."""
 
@@ -35,6 +37,7 @@ class ValveWriter(Node):
         self._wanted_float: bool | None = None
         self._float_counter = self._presses = 0
         self._stop_frame_ns = -BUTTON_PAUSE_NS
+        self._frames, self._counted_ns, self._bus_rate_hz = 0, 0, 0.0
         self._floating: bool | None = None
         self._pressure_pa = math.nan
 
@@ -63,6 +66,10 @@ class ValveWriter(Node):
         yield self._frame(command, now_ns)
 
     def _received(self, message: CanIn, now_ns: int) -> Iterator[Message]:
+        self._frames += 1
+        if now_ns - self._counted_ns >= COUNTED_NS:
+            self._bus_rate_hz = self._frames * 1e9 / (now_ns - self._counted_ns)
+            self._frames, self._counted_ns = 0, now_ns
         reported = decode(CanFrame(message.arbitration_id, message.data))
         match reported:
             case bus.Stop() if reported.vehicle in (self._index, bus.EVERY_VEHICLE):
@@ -84,6 +91,7 @@ class ValveWriter(Node):
                     reported.is_float_air_on,
                     self._pressure_pa,
                     reported.node_faults,
+                    self._bus_rate_hz,
                 )
 
     def _float_order(self, now_ns: int) -> CanOut:
