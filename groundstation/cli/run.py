@@ -56,15 +56,19 @@ def run(
     if lockstep:
         if duration is None:
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
-        with _progress(duration) as update:
-            run_lockstep(loaded, text, rig, recording, duration, seed, update)
-    else:
-        if seed is not None:
-            raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
-        _run_live(
-            LiveRun(loaded, text, rig, recording), duration, headless=headless or not sys.stdout.isatty()
-        )
-    finished = _say_recordings(recording)
+    elif seed is not None:
+        raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
+    finished: list[Path] = []
+    try:
+        if lockstep:
+            assert duration is not None
+            with _progress(duration) as update:
+                run_lockstep(loaded, text, rig, recording, duration, seed, update)
+        else:
+            live = LiveRun(loaded, text, rig, recording)
+            _run_live(live, duration, headless=headless or not sys.stdout.isatty())
+    finally:
+        finished = _say_recordings(recording)
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
