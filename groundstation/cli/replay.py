@@ -74,12 +74,14 @@ def _replay(
     output = None if out is None else Recorder(out, replace(info, software=software()))
     try:
         report = ReplayRunner(found, _factory(rig), nodes, allowed, output).run()
+        if output is not None:
+            output.finish()
     except BaseException:  # no partial output, not even on Ctrl-C
         if output is not None:
             output.discard()
         raise
     if output is not None:
-        print(f"replayed: {output.finish()}")
+        print(f"replayed: {output.path}")
     return report
 
 

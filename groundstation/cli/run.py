@@ -115,8 +115,10 @@ def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
             while not ending.asked:
                 live.step(REFRESH_S)
                 now_s = time.monotonic()
-                if until_s is None and live.is_ready and duration is not None:
-                    until_s = now_s + duration
+                if until_s is None and duration is not None:
+                    live.check_start()
+                    if live.is_ready:
+                        until_s = now_s + duration
                 if until_s is not None and now_s >= until_s:
                     break
                 if not headless:

@@ -15,7 +15,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.port import Port
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Delivery, Pace, Scope
-from groundstation.rig.plan import nodes_of
+from groundstation.rig.plan import make_nodes
 from groundstation.runners.slot import Sequences, Slot, Timing, owner_of
 
 JOURNAL_PERIOD_NS = 100_000_000
@@ -213,13 +213,13 @@ def build_slots(
 
     Raises:
         ValueError: A node refuses its configuration.
+        UsageError: A part makes a node that no runner could run.
     """
     slots = []
-    for row, vehicle, _ in nodes_of(rig, process):
+    for (row, vehicle, _), node in make_nodes(rig, process):
         section = rig.nodes.get(row.name)
         timing = Timing()
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
-        node = row.make(rig, vehicle)
         slots.append(Slot(row.key(vehicle), node, process or name, journal, sequences, measure, timing))
     return slots
