@@ -65,7 +65,7 @@ def _replay(
     found: Recording, nodes: list[str] | None, out: Path | None, rig_path: Path | None, allowed: Tolerances
 ) -> ReplayReport:
     info, rig = _rig_of(found, rig_path)
-    for sentence in changed_files(rig, found.info):
+    for sentence in (*found.missing(), *changed_files(rig, found.info)):
         print(sentence)
     if info.software not in ("", software()):
         print(
