@@ -14,18 +14,8 @@ from groundstation.rig.read import parse_rig
 
 RIG = Path(__file__).parents[4] / "examples" / "rigs" / "drawn_fixes.toml"
 TEXT = RIG.read_text()
-WRONG = sorted(OF_THE_BUS | OF_THE_LAUNCHER) + [
-    "",
-    "a/b",
-    "*",
-    "a*",
-    "a b",
-    "A",
-    "1st",
-    "{vehicel}_x",
-    "ä",
-    "a\n",
-]
+WRONG = [*sorted(OF_THE_BUS | OF_THE_LAUNCHER), "", "a/b", "*", "a*", "a b", "A", "1st", "{vehicel}_x", "ä"]
+WRONG += ["a\n"]
 NODES = ["fusion", "imu_reader", "failure_desk"]
 
 
