@@ -3,6 +3,8 @@
 import math
 import re
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import fields
+from typing import Annotated, get_args, get_origin
 
 from groundstation.declarations.calls import calling
 from groundstation.declarations.errors import UsageError
@@ -18,6 +20,7 @@ from groundstation.declarations.topic import Topic
 from groundstation.declarations.view import GaugeRow
 
 _ROS_TYPE = re.compile(r"[a-z]\w*/msg/[A-Z]\w*")
+_FIELD = re.compile(r"(bool|u?int(8|16|32|64)|float(32|64)|string)(\[\d*\])?")
 _LATER = re.compile(r"\w+(\.\w+)*:[A-Za-z_]\w*")
 _ROWS = (
     ("nodes", NodeRow),
@@ -137,6 +140,12 @@ def _wrong_topic(kind: type[Message]) -> Iterator[str]:
         yield f"topic {topic.noun!r}: pace_ns is {topic.pace_ns!r:.80}, expected whole nanoseconds from 0 up"
     if not isinstance(kind.ROS_TYPE, str) or not _ROS_TYPE.fullmatch(kind.ROS_TYPE):
         yield f"topic {topic.noun!r}: ROS_TYPE is {kind.ROS_TYPE!r:.80}, expected package/msg/Name"
+
+    for field in fields(kind)[2:]:  # behind the header
+        ros_type = get_args(field.type)[1] if get_origin(field.type) is Annotated else None
+        if not isinstance(ros_type, str) or not _FIELD.fullmatch(ros_type):
+            where = f"topic {topic.noun!r}: field {field.name!r}"
+            yield f"{where} is {field.type!r:.80}, expected a type of messages such as F64"
 
 
 def _wrong_node(row: NodeRow) -> Iterator[str]:

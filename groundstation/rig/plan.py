@@ -7,6 +7,7 @@ from typing import NamedTuple
 from groundstation.declarations.calls import calling
 from groundstation.declarations.checks import check_node
 from groundstation.declarations.errors import RigError, UsageError
+from groundstation.declarations.message import Message
 from groundstation.declarations.names import OF_THE_BUS, process_trouble
 from groundstation.declarations.node import COMMANDS, Node, NodeRow, Weight
 from groundstation.declarations.port import Port
@@ -112,17 +113,17 @@ def make_nodes(rig: Rig, process: str | None = None) -> list[tuple[Placed, Node]
     """
     found = [(placed, made(rig, placed)) for placed in nodes_of(rig, process)]
     if process is None:
-        _check_publishers(rig, found)
+        _check_publishers(rig, [(placed, node.outputs) for placed, node in found])
     return found
 
 
-def _check_publishers(rig: Rig, nodes: Iterable[tuple[Placed, Node]]) -> None:
+def _check_publishers(rig: Rig, nodes: Iterable[tuple[Placed, tuple[type[Message], ...]]]) -> None:
     """Refuse two nodes, or a node and a port, that publish one topic of one vehicle or of the rig."""
     first: dict[tuple[str, str], str] = {}
     makers = [
         (kind, placed.vehicle, f"node {placed.key!r} of {rig.tables.part_of(placed.row).title}")
-        for placed, node in nodes
-        for kind in dict.fromkeys(node.outputs)
+        for placed, outputs in nodes
+        for kind in dict.fromkeys(outputs)
     ]
     makers += [(port.reads, port.vehicle, f"port {port.channel!r}") for port, _ in ports_of(rig)]
     for kind, vehicle, name in makers:
@@ -151,6 +152,7 @@ def check_plan(rig: Rig) -> None:
     Raises:
         RigError: An unknown node, a heavy node together with an urgent one, a process that is named like a
             vehicle or like one of the ground station's own.
+        UsageError: Two nodes publish the same topic of one owner.
     """
     known = rig.tables.nodes
     for name in rig.nodes:
@@ -173,6 +175,8 @@ def check_plan(rig: Rig) -> None:
             if given is None or given.process is None:
                 where = f"{rig.tables.part_of(placed.row).title}: the process of node {placed.row.name!r}"
             raise RigError(f"{where}: {trouble}")
+    kinds = [(placed, placed.row.kind) for placed in nodes_of(rig)]
+    _check_publishers(rig, [(placed, kind.outputs) for placed, kind in kinds if not isinstance(kind, str)])
     clash = set(processes_of(rig)) & set(rig.vehicles)
     if clash:
         raise RigError(f"'{clash.pop()}' names both a vehicle and a process: choose another vehicle name")

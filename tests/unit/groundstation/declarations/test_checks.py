@@ -1,8 +1,8 @@
 """What a part declares wrongly is refused in one sentence that names it, before anything flies."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import pytest
 
@@ -46,10 +46,21 @@ class Rival(Message):
     level_counts: I64
 
 
+NAMES = {"TOPIC": Topic("rain"), "ROS_TYPE": "pack_msgs/msg/Rain"}
+
+
+WRONG_FIELDS = {"dict": dict, "float": float, "float99": Annotated[float, "float99"], "text": "F64"}
+
+
+def with_field(kind):
+    """A class with a field of a type."""
+    return make_dataclass("Rain", [("v", kind)], bases=(Message,), namespace=NAMES, frozen=True)
+
+
 def rain(topic=None, ros_type=None):
     """A class like ``Rain`` with another topic or type."""
     names = {"TOPIC": topic or Topic("rain"), "ROS_TYPE": ros_type or "pack_msgs/msg/Rain"}
-    return type("Rain", (Rain,), {"__slots__": (), **names}) if ros_type != 5 else None
+    return type("Rain", (Rain,), {"__slots__": (), **names})
 
 
 class Gauge(Node):
@@ -111,6 +122,10 @@ DECLARED = {
     **{
         f"a ROS type {name!r}": (part(topics=(rain(ros_type=name),)), f"ROS_TYPE is {name!r}")
         for name in ("nonsense", "a/msg/", "/msg/B", "a/B", "a/srv/B", "a/msg/b", "a b/msg/B", 7)
+    },
+    **{
+        f"a field of type {name}": (part(topics=(with_field(kind),)), "topic 'rain': field 'v' is ")
+        for name, kind in WRONG_FIELDS.items()
     },
     "a topic that is no message": (part(topics=(int,)), "topics holds <class 'int'>"),
     "topics that are no tuple": (part(topics=Rain), "topics is <class"),
@@ -187,7 +202,8 @@ CALLED = {
     "an input of nobody": (made(inputs=(Stray,)), f"{NODE}receives Stray"),
     "an output of nobody": (made(outputs=(Stray,)), f"{NODE}publishes Stray"),
     "an output of another part": (
-        made(kind(outputs=(VehicleState,))), "'alpha/fusion' of the part 'fusion' and node 'alpha/gauge'",
+        part(nodes=(node(kind=kind(outputs=(VehicleState,))),)),
+        "'alpha/fusion' of the part 'fusion' and node 'alpha/gauge'",
     ),
     "a pace that there is none": (
         made(kind(paced=(VehicleState,), inputs=(Rain,))), f"{NODE}takes VehicleState",
