@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from groundstation.bus.cdr_fields import Part, Run, parts, ros_fields
+from groundstation.declarations.errors import NodeError
 from groundstation.declarations.message import Message
 
 __all__ = ["ENCAPSULATION", "Codec", "CodecError", "codec_of", "ros_fields", "stamp_of"]
@@ -46,15 +47,22 @@ class Codec(Generic[M]):
         self._heads: dict[str, tuple[Callable[..., bytes], int, bytes]] = {}  # by the name of the vehicle
 
     def encode(self, message: M) -> bytes:
-        """Serialise a payload, encapsulation header included."""
-        pack, length, name = self._heads.get(message.vehicle) or self._head(message.vehicle)
-        seconds, nanoseconds = divmod(message.stamp_ns, _NS)
-        head = pack(ENCAPSULATION, seconds, nanoseconds, length, name, *self._flat(message))
-        if not self._rest:
-            return head
-        out = bytearray(head)
-        for part in self._rest:
-            part.put(out, message)
+        """Serialise a payload, encapsulation header included.
+
+        Raises:
+            NodeError: Whoever made the payload gave a field a value of another type or out of its range.
+        """
+        try:
+            pack, length, name = self._heads.get(message.vehicle) or self._head(message.vehicle)
+            seconds, nanoseconds = divmod(message.stamp_ns, _NS)
+            head = pack(ENCAPSULATION, seconds, nanoseconds, length, name, *self._flat(message))
+            if not self._rest:
+                return head
+            out = bytearray(head)
+            for part in self._rest:
+                part.put(out, message)
+        except (struct.error, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise NodeError(f"{message!r:.300} was published and does not fit its fields: {error}") from error
         return bytes(out)
 
     def decode(self, data: bytes) -> M:

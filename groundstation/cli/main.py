@@ -40,6 +40,8 @@ ALIASES = {
     ("star-tracker", "overhead-pose"): ("calibrate", "overhead"),
 }
 """Spellings of before that go on working."""
+DEBUG = "GROUNDSTATION_DEBUG"
+"""Set in the environment, or by ``--debug`` on the line: an error's traceback comes before its sentence."""
 
 
 def spelled(words: list[str]) -> list[str]:
@@ -140,18 +142,29 @@ def call(words: list[str]) -> int:
     from groundstation.files.errors import FileError
     from groundstation.recording.errors import RecordingError
 
+    if "--debug" in words:
+        words = [word for word in words if word != "--debug"]
+        os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
         build(words)(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
-        sys.stderr.write(f"groundstation: {error}\n")
-        return 2
+        return _refuse(error, 2)
     except (GroundStationError, CoreError) as error:
-        sys.stderr.write(f"groundstation: {error}\n")
-        return 1
+        return _refuse(error, 1)
     return 0
+
+
+def _refuse(error: Exception, code: int) -> int:
+    """Write the sentence of an error of ours, after its traceback where that is asked for."""
+    if os.environ.get(DEBUG):
+        import traceback
+
+        traceback.print_exception(error)
+    sys.stderr.write(f"groundstation: {error}\n")
+    return code
 
 
 def main() -> None:

@@ -56,15 +56,19 @@ def run(
     if lockstep:
         if duration is None:
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
-        with _progress(duration) as update:
-            run_lockstep(loaded, text, rig, recording, duration, seed, update)
-    else:
-        if seed is not None:
-            raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
-        _run_live(
-            LiveRun(loaded, text, rig, recording), duration, headless=headless or not sys.stdout.isatty()
-        )
-    finished = _say_recordings(recording)
+    elif seed is not None:
+        raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
+    finished: list[Path] = []
+    try:
+        if lockstep:
+            assert duration is not None
+            with _progress(duration) as update:
+                run_lockstep(loaded, text, rig, recording, duration, seed, update)
+        else:
+            live = LiveRun(loaded, text, rig, recording)
+            _run_live(live, duration, headless=headless or not sys.stdout.isatty())
+    finally:
+        finished = _say_recordings(recording)
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
@@ -111,8 +115,10 @@ def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
             while not ending.asked:
                 live.step(REFRESH_S)
                 now_s = time.monotonic()
-                if until_s is None and live.is_ready and duration is not None:
-                    until_s = now_s + duration
+                if until_s is None and duration is not None:
+                    live.check_start()
+                    if live.is_ready:
+                        until_s = now_s + duration
                 if until_s is not None and now_s >= until_s:
                     break
                 if not headless:

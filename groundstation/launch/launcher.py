@@ -19,6 +19,7 @@ import zenoh
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
+from groundstation.declarations.names import LABORATORY, RECORDER
 from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.rig import STATION, Rig
 from groundstation.launch import process, recorder
@@ -28,10 +29,9 @@ from groundstation.launch.forking import share_one_arena
 from groundstation.launch.memory import forget, memory_folder
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
-from groundstation.rig.plan import RECORDER, processes_of
+from groundstation.rig.plan import processes_of
 from groundstation.rig.read import bytes_of
 
-LABORATORY = "laboratory"
 START_S = 30.0
 """A process that is not ready by then never will be."""
 HOPELESS = 4  # restarts of a process that was never ready

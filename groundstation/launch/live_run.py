@@ -9,9 +9,12 @@ from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
 from groundstation.bus.zenoh_bus import RECORD, Mailbox, split_key
+from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.names import LAUNCHER
 from groundstation.declarations.rig import Rig
-from groundstation.launch.launcher import Launcher
+from groundstation.launch.launcher import START_S, Launcher
 from groundstation.launch.running import RunningRig
+from groundstation.launch.running_time import RunningTime
 from groundstation.parts.operation.messages import Latency
 from groundstation.watch.monitor import Monitor
 
@@ -19,7 +22,9 @@ LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05
 MOST_BATCHES = 4096
 """Of record streams, half a minute's; a launcher that is kept from looking for longer loses the oldest."""
-PROCESS = "launcher"
+READY_S = 2 * START_S
+"""What is not ready by then never will be: the laboratory has its time, then its processes have theirs."""
+PROCESS = LAUNCHER
 """Whose record stream the latency is in."""
 
 
@@ -44,6 +49,7 @@ class LiveRun:
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
+        self._starting = RunningTime()
         self._announcement: Path | None = None
 
     @property
@@ -73,6 +79,16 @@ class LiveRun:
                 self._publish_latency()
                 self.monitor.look(time.monotonic_ns())
             time.sleep(min(POLL_S, max(until_s - time.monotonic(), 0.0)))  # all at once costs least
+
+    def check_start(self) -> None:
+        """Call where nobody watches who could end a run that does not get ready.
+
+        Raises:
+            GroundStationError: It is not ready in the time that the laboratory and the processes have.
+        """
+        if not self.is_ready and self._starting.step(time.monotonic()) > READY_S:
+            names = ", ".join(self.launcher.waiting_for)
+            raise GroundStationError(f"the rig is not ready after {READY_S:g} s: {names} did not start")
 
     def close(self) -> None:
         """End everything in good order."""

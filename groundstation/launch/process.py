@@ -6,6 +6,7 @@ import pickle
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 
 from drivers.errors import DeviceError
@@ -55,6 +56,8 @@ def obey(work: Callable[[Orders], None], orders: Orders) -> None:
 
 
 def _end_with(error: Exception, code: int) -> int:
+    if os.environ.get("GROUNDSTATION_DEBUG"):
+        traceback.print_exception(error)
     sys.stderr.write(" ".join(str(error).split()) + "\n")
     return code
 

@@ -60,10 +60,9 @@ def in_a_sentence(recorder: Recorder) -> Iterator[None]:
     """
     try:
         yield
-    except OSError as error:
+    except RecordingError as error:
         raise GroundStationError(
-            f"{recorder.part_path} cannot be written any further: {error.strerror or error} "
-            f"(after {recorder.message_count} messages; recovery brings back what is there)"
+            f"{error} (after {recorder.message_count} messages; recovery brings back what is there)"
         ) from error
 
 
@@ -72,8 +71,6 @@ def _begin(path: Path, info: RecordingInfo) -> Recorder:
         return Recorder(path, info)
     except RecordingError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def write_until_end(

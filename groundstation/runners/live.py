@@ -267,6 +267,7 @@ class LiveProcess:
         now_ns = time.monotonic_ns()
         self._out.send(self._step.take_journal(now_ns))
         self._out.close(now_ns)
+        self._step.raise_what_stopping_raised()
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from typing import Protocol
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import Journal, JournalWriter, Kind
+from groundstation.declarations.errors import NodeError
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.port import Port
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Delivery, Pace, Scope
-from groundstation.rig.plan import nodes_of
+from groundstation.rig.plan import make_nodes
 from groundstation.runners.slot import Sequences, Slot, Timing, owner_of
 
 JOURNAL_PERIOD_NS = 100_000_000
@@ -62,6 +63,7 @@ class Step:
         self._journal = journal
         self._sequences = sequences
         self._transport = transport
+        self._trouble: NodeError | None = None
         self._receivers: dict[Address, list[Slot]] = {}
         self._takers: dict[
             Address, list[tuple[Slot, Pace | None]]
@@ -90,8 +92,22 @@ class Step:
             self._publish(slot.start(now_ns))
 
     def stop(self, slot: Slot, now_ns: int) -> None:
-        """Take a node's last messages."""
-        self._publish(slot.stop(now_ns))
+        """Take a node's last messages; what it raises is kept, so that the others are stopped too."""
+        is_first = not any(each.has_failed for each in self.slots)
+        try:
+            self._publish(slot.stop(now_ns))
+        except NodeError as error:
+            if is_first:  # later ones follow from the first, which has been raised
+                self._trouble = error
+
+    def raise_what_stopping_raised(self) -> None:
+        """Call once all nodes have been stopped.
+
+        Raises:
+            NodeError: One of them raised something, and nothing had failed before.
+        """
+        if self._trouble is not None:
+            raise self._trouble
 
     def tick(self, slot: Slot, now_ns: int) -> None:
         """Let time pass for a node."""
@@ -197,13 +213,13 @@ def build_slots(
 
     Raises:
         ValueError: A node refuses its configuration.
+        UsageError: A part makes a node that no runner could run.
     """
     slots = []
-    for row, vehicle, _ in nodes_of(rig, process):
+    for (row, vehicle, _), node in make_nodes(rig, process):
         section = rig.nodes.get(row.name)
         timing = Timing()
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
-        node = row.make(rig, vehicle)
         slots.append(Slot(row.key(vehicle), node, process or name, journal, sequences, measure, timing))
     return slots
