@@ -122,7 +122,7 @@ class ModeMachine:
             The reason why it does not count in this mode; empty if it does.
         """
         row = transition(self.mode, event)
-        if row is None or (event is Event.RESUME and self.then is Then.LAND):
+        if row is None or not self._may_fly_on(event):
             return _refusal(event, self.memory)
         if author and row.who is Who.STATION:
             return f"{event} is for the station itself to decide"
@@ -143,6 +143,11 @@ class ModeMachine:
             since_ns=self.memory.since_ns if stays else now_ns,
         )
         return ""
+
+    def _may_fly_on(self, event: Event) -> bool:
+        """Whether braking was not begun for something stronger than what the event takes back."""
+        strongest = {Event.RESUME: Then.HOLD, Event.FAULTS_GONE: Then.FLY}.get(event, Then.LAND)
+        return self.then <= strongest
 
     def _grounded(self) -> Mode:
         if self.memory.is_stop_latched:
