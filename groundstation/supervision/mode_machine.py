@@ -133,7 +133,7 @@ class ModeMachine:
         if after is Mode.LANDED and event is Event.AIR_IS_OFF:
             after = self._grounded()
         words = f"{row.cause}: {cause}" if cause else row.cause
-        keeps_cause = event in _KEEPS_CAUSE and not cause
+        keeps_cause = (event, self.mode) in _KEEPS_CAUSE and not cause
         stays = after is self.mode
         self.memory = replace(
             self.memory,
@@ -198,8 +198,15 @@ class ModeMachine:
             self.apply(Event.HELD, now_ns)
 
 
-_KEEPS_CAUSE = frozenset({Event.AT_REST, Event.HELD, Event.AIR_IS_OFF})
-"""Events that carry on what something else began: its cause stays the one to be shown."""
+_KEEPS_CAUSE = frozenset(
+    {
+        (Event.AT_REST, Mode.BRAKING),
+        (Event.HELD, Mode.BRAKING),
+        (Event.HELD, Mode.HOLDING),
+        (Event.AIR_IS_OFF, Mode.LANDING),
+    }
+)
+"""Events that carry on, in a mode, what something else began: its cause stays the one to be shown."""
 
 
 def _refusal(event: Event, memory: Memory) -> str:
