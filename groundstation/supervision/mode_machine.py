@@ -210,12 +210,12 @@ _KEEPS_CAUSE = frozenset(
 
 
 def _refusal(event: Event, memory: Memory) -> str:
-    if memory.is_stop_latched:
+    if memory.is_stop_latched and event is not Event.RELEASE:
         whose = f" by {memory.author}" if memory.author else ""
         return f"a stop is latched{whose}: release it first"
     if memory.mode in BRAKEABLE and event is Event.RESUME:
         return f"it is about to land: {memory.cause}"
-    hint = _HINTS.get(event)
+    hint = _HINTS.get(event) if not memory.is_stop_latched else "wait until it is down"
     return f"{event} does not count while it is {memory.mode}" + (f": {hint}" if hint else "")
 
 
