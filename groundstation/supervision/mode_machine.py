@@ -201,7 +201,6 @@ class ModeMachine:
 _KEEPS_CAUSE = frozenset(
     {
         (Event.AT_REST, Mode.BRAKING),
-        (Event.HELD, Mode.BRAKING),
         (Event.HELD, Mode.HOLDING),
         (Event.AIR_IS_OFF, Mode.LANDING),
     }
