@@ -1,4 +1,4 @@
-"""A vehicle for the supervisor, made of sightings alone: everything is fresh and well unless a test says so."""
+"""A vehicle made of sightings alone: everything is fresh and well unless a test says otherwise."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The state machine: what is latched, what braking leads to, presses, restarts; and every state it can reach."""
+"""The state machine: latches, what braking leads to, presses, restarts; and every state it can reach."""
 
 import itertools
 from dataclasses import replace
