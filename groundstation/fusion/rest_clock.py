@@ -27,6 +27,9 @@ LEAD_NS = 250_000_000
 QUIET_S = 1.0
 """After motion: a hand that carries evenly for a moment is no rest."""
 
+LANDING_S = 0.4
+"""After the float air was cut: so long bearings may still carry, and friction has to stop what is left."""
+
 Readings = tuple[float, float, float]
 """Rate (rad/s) and specific forces along body x, y (m/s^2), as read."""
 
@@ -66,7 +69,7 @@ class RestClock:
 
     def float_up(self, now_ns: int) -> RestChange | None:
         """Note that the float air is on: the length of the rest stays what it was."""
-        self._is_landed, self._quiet_s = False, QUIET_S
+        self._is_landed, self._quiet_s = False, LANDING_S
         began_ns, self._began_ns = self._began_ns, None
         return None if began_ns is None else RestChange(False, now_ns)
 

@@ -44,7 +44,7 @@ def ask(
             batch = RecordWriter()
             batch.add(envelope, encoded)
             bus.publish_batch(process, batch.take())
-            bus.publisher(Request.TOPIC, process, always=True).put(encoded, envelope.attachment())
+            bus.publisher(Request.TOPIC, process).put(encoded, envelope.attachment())
             return _wait(acks, request, timeout_s)
     except zenoh.ZError as error:
         raise GroundStationError(f"the rig at {endpoint} does not let us in: {error}") from error

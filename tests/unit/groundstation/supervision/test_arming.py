@@ -13,7 +13,7 @@ NOW_NS = 20 * S
 @pytest.fixture
 def known(sightings, seen, node):
     """All is well."""
-    known = sightings(findings_ns=NOW_NS, rest_s=8.0, fix_age_s=0.3)
+    known = sightings(findings_ns=NOW_NS, rest_s=8.0, fix_age_s=0.3, agreeing=2)
     known.own, known.node = seen(NOW_NS), node(NOW_NS)
     return known
 
@@ -72,6 +72,11 @@ def test_the_newest_fix_must_be_fresh(known):
     assert against(known) == ()
     known.fix_age_s = 3.1
     assert against(known, override="x") == ("fixes: the newest fix is 3.1 s old",)
+
+
+def test_two_fixes_must_agree(known):
+    known.agreeing = 1
+    assert against(known, override="x") == ("fixes: 1 fixes agree, 2 are asked for",)
 
 
 def test_it_must_stand_on_its_part_of_the_table(known, seen):

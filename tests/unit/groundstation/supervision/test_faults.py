@@ -9,8 +9,8 @@ S = 1_000_000_000
 CLEAR_NS = round(CLEAR_S * S)
 
 
-def fault(name, *steps, clears=Clears.ITSELF):
-    return Fault(name, "What.", "how", 1.0, steps, clears, True, False, "Do.")
+def fault(name, *steps, clears=Clears.ITSELF, confirm_s=0.0):
+    return Fault(name, "What.", "how", 1.0, steps, clears, True, False, "Do.", confirm_s=confirm_s)
 
 
 TABLE = {
@@ -20,6 +20,7 @@ TABLE = {
         fault("hold", (0.0, Response.HOLD)),
         fault("also_hold", (0.0, Response.HOLD)),
         fault("grows", (0.0, Response.NOTE), (2.0, Response.LAND), (3.0, Response.CUT)),
+        fault("slow", (0.0, Response.HOLD), confirm_s=0.5),
         fault("latched", (0.0, Response.CUT), clears=Clears.PERSON),
     )
 }
@@ -55,7 +56,7 @@ def test_responses_are_ordered_by_strength_and_have_words():
 def test_a_vehicle_without_faults_has_nothing_due(board):
     assert not board.look(0, {})
     assert not ids(board)
-    assert board.worst(0) is None
+    assert board.worst() is None
     assert not board.clear()
 
 
@@ -87,7 +88,32 @@ def test_a_fault_that_flickers_is_one_fault(board):
     board.look(0, {"grows": ""})
     assert not board.look(S // 2, {})
     assert not board.look(S, {"grows": ""})
-    assert next(iter(board)).response(2 * S) is Response.LAND
+    assert board.look(2 * S, {"grows": ""})
+    assert next(iter(board)).response is Response.LAND
+
+
+def test_a_step_of_the_response_is_a_change(board):
+    board.look(0, {"grows": ""})
+    changes = [half for half in range(1, 9) if board.look(half * S // 2, {"grows": ""})]
+    assert changes == [4, 6]
+
+
+def test_a_response_does_not_grow_while_the_fault_is_not_seen(board):
+    board.look(0, {"grows": ""})
+    board.look(2 * S - 1, {"grows": ""})
+    assert not board.look(2 * S + 1, {})
+    assert next(iter(board)).response is Response.NOTE
+
+
+def test_what_has_to_be_confirmed_must_be_seen_without_a_break(board):
+    assert not board.look(0, {"slow": "first"})
+    assert not board.look(S // 2 - 1, {"slow": ""})
+    board.look(S // 2, {})
+    assert not board.look(S, {"slow": ""})
+    assert not board.look(3 * S // 2 - 1, {"slow": ""})
+    assert board.look(3 * S // 2, {"slow": "now"})
+    (row,) = board
+    assert (row.detail, row.since_ns) == ("now", 3 * S // 2)
 
 
 def test_a_fault_that_is_seen_all_the_time_never_ends(board):
@@ -98,12 +124,12 @@ def test_a_fault_that_is_seen_all_the_time_never_ends(board):
 
 def test_a_latched_fault_that_is_gone_stands_but_asks_for_nothing(board):
     board.look(0, {"latched": "first"})
-    assert board.worst(0).fault.id == "latched"
+    assert board.worst().fault.id == "latched"
     assert board.look(CLEAR_NS, {})
     (row,) = board
     assert not row.is_there
-    assert row.response(CLEAR_NS) is Response.NOTE
-    assert board.worst(CLEAR_NS) is None
+    assert row.response is Response.NOTE
+    assert board.worst() is None
     assert not board.look(2 * CLEAR_NS, {})
 
 
@@ -115,7 +141,7 @@ def test_a_latched_fault_that_comes_back_begins_again(board):
     assert (row.detail, row.since_ns, row.seen_ns, row.is_there) == (
         "second", 2 * CLEAR_NS, 2 * CLEAR_NS, True,
     )  # fmt: skip
-    assert board.worst(2 * CLEAR_NS) is row
+    assert board.worst() is row
     assert not board.look(3 * CLEAR_NS - 1, {})
 
 
@@ -134,10 +160,13 @@ def test_a_person_clears_what_is_gone_and_nothing_else(board):
 
 
 def test_the_strongest_response_counts_and_the_oldest_of_equals(board):
-    board.look(0, {"note": "", "hold": "", "also_hold": "", "grows": ""})
-    assert board.worst(0).fault.id == "hold"
-    assert board.worst(2 * S).fault.id == "grows"
-    assert board.worst(2 * S - 1).fault.id == "hold"
+    found = {"note": "", "hold": "", "also_hold": "", "grows": ""}
+    board.look(0, found)
+    assert board.worst().fault.id == "hold"
+    board.look(2 * S - 1, found)
+    assert board.worst().fault.id == "hold"
+    board.look(2 * S, found)
+    assert board.worst().fault.id == "grows"
 
 
 def test_the_board_of_a_vehicle_knows_the_whole_table():

@@ -64,7 +64,7 @@ class SupervisedVehicle(RuleBasedStateMachine):
                 known.findings, known.findings_ns = self.findings, now_ns
             if "demand" not in self.silent:
                 known.demand_ns = now_ns
-            known.rest_s, known.fix_age_s = 8.0, 0.5
+            known.rest_s, known.fix_age_s, known.agreeing = 8.0, 0.5, 2
             self.supervisor.look(now_ns)
             self.judge()
 

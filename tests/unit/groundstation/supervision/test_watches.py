@@ -13,7 +13,7 @@ class TestImu:
     @pytest.fixture
     def watch(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, reason="", elapsed_ms=10)
+        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
         return watch
 
     def test_before_the_first_sample_nothing_is_wrong(self):
@@ -25,7 +25,7 @@ class TestImu:
 
     def bad(self, watch, reason, start_ms=10, end_ms=110):
         for now_ms in range(start_ms, end_ms + 1, 10):
-            watch.take(now_ms * MS, is_valid=False, reason=reason, elapsed_ms=10)
+            watch.take(now_ms * MS, is_valid=False, is_rate_usable=False, reason=reason, elapsed_ms=10)
 
     @pytest.mark.parametrize(
         ("reason", "fault"),
@@ -43,7 +43,7 @@ class TestImu:
 
     def test_one_good_sample_begins_the_count_anew(self, watch):
         self.bad(watch, "stuck", 10, 60)
-        watch.take(70 * MS, is_valid=True, reason="", elapsed_ms=10)
+        watch.take(70 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
         self.bad(watch, "stuck", 80, 170)
         assert list(watch.findings(179 * MS)) == []
         assert [fault for fault, _ in watch.findings(180 * MS)] == ["imu_stuck"]
@@ -53,7 +53,7 @@ class TestImu:
         assert [fault for fault, _ in watch.findings(500 * MS)] == ["imu_silent"]
 
     def test_a_restart_of_the_block_is_shown_for_a_second(self, watch):
-        watch.take(10 * MS, is_valid=True, reason="", elapsed_ms=0)
+        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0)
         jumped = ("imu_clock_jumped", "the block has started again")
         assert list(watch.findings(11 * MS)) == [jumped]
         self.keep(watch, 1000)
@@ -62,23 +62,23 @@ class TestImu:
 
     def keep(self, watch, until_ms):
         for now_ms in range(20, until_ms + 1, 10):
-            watch.take(now_ms * MS, is_valid=True, reason="", elapsed_ms=10)
+            watch.take(now_ms * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
 
     def test_the_very_first_sample_is_no_restart(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, reason="", elapsed_ms=0)
+        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0)
         assert list(watch.findings(0)) == []
 
     def test_ticks_far_beyond_the_wait_are_a_jump(self, watch):
-        watch.take(10 * MS, is_valid=True, reason="", elapsed_ms=510)
+        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=510)
         assert list(watch.findings(10 * MS)) == []
-        watch.take(30 * MS, is_valid=True, reason="", elapsed_ms=521)
+        watch.take(30 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=521)
         assert list(watch.findings(30 * MS)) == [("imu_clock_jumped", "by 501 ms")]
 
     def test_ticks_that_the_line_held_up_are_none(self, watch):
-        watch.take(600 * MS, is_valid=True, reason="", elapsed_ms=1100)
+        watch.take(600 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=1100)
         assert list(watch.findings(600 * MS)) == []
-        watch.take(1200 * MS, is_valid=True, reason="", elapsed_ms=1101)
+        watch.take(1200 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=1101)
         assert list(watch.findings(1200 * MS)) == [("imu_clock_jumped", "by 501 ms")]
 
 

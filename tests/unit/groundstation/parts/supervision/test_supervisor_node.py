@@ -75,8 +75,9 @@ def state(vehicle, position=(0.0, 0.0), velocity=(0.0, 0.0), status="flying", si
     return VehicleState(0, vehicle, position, 0.5, velocity, 0.25, sigma, status, 1)
 
 
-def status_of_fusion(rest_s=9.0, fix_age_s=0.5):
-    return FusionStatus(0, "alpha", "flying", "m", 0.0, (0.0, 0.0), rest_s, 5, 0, fix_age_s, (0.0, 0.0))
+def status_of_fusion(rest_s=9.0, fix_age_s=0.5, used=5, refused=0):
+    counts = (used, refused, fix_age_s)
+    return FusionStatus(0, "alpha", "flying", "m", 0.0, (0.0, 0.0), rest_s, *counts, (0.0, 0.0))
 
 
 @pytest.fixture
@@ -105,7 +106,7 @@ def test_it_begins_with_a_ruling_and_the_faults_both_latched():
         math.inf, 0, "it has just begun", "",
     )  # fmt: skip
     assert isinstance(faults, Faults)
-    assert (faults.ids, faults.there) == ((), ())
+    assert (faults.ids, faults.gone_ns) == ((), ())
     assert driven.known.began_ns == 7
 
 
@@ -156,6 +157,13 @@ class TestWhatItSees:
         node.receive(RecorderStatus(0, "", "x.mcap", 1, 2, 77.0))
         assert (node.known.rest_s, node.known.fix_age_s) == (3.0, 0.7)
         assert (node.known.recorder_ns, node.known.recorder_room_s) == (5, 77.0)
+
+    def test_fixes_agree_since_the_last_one_that_was_refused(self, node):
+        agreeing = []
+        for used, refused in ((1, 0), (3, 0), (3, 0), (4, 1), (5, 1), (6, 1), (2, 1), (4, 1)):
+            node.receive(status_of_fusion(used=used, refused=refused))
+            agreeing.append(node.known.agreeing)
+        assert agreeing == [1, 3, 3, 0, 1, 2, 0, 2]  # the last zero: fusion was started again
 
     def test_the_valve_node(self, node):
         node.now_ns = 5
@@ -261,7 +269,7 @@ class TestFaults:
         assert faults.since_ns == (float(node.now_ns),)
         assert faults.responses == ("brakes, then lands",)
         assert faults.advices == ("Clean or replace the valve.",)
-        assert faults.there == (1.0,)
+        assert faults.gone_ns == (0.0,)
         again = node.tick(*node.well(floating=True, armed=True), found)
         assert not any(isinstance(message, Faults) for message in again)
         later = [
@@ -270,7 +278,7 @@ class TestFaults:
             for message in node.tick(*node.well(floating=True, armed=True))
             if isinstance(message, Faults)
         ]
-        assert [faults.there for faults in later] == [(0.0,)]
+        assert [faults.gone_ns for faults in later] == [(faults.since_ns[0] + PERIOD_NS,)]  # when it was seen last
         assert later[0].responses == ("flies on",)
 
     def test_the_ruling_goes_before_the_faults(self, node):
