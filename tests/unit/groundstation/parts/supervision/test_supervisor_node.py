@@ -278,7 +278,7 @@ class TestFaults:
             for message in node.tick(*node.well(floating=True, armed=True))
             if isinstance(message, Faults)
         ]
-        assert [faults.gone_ns for faults in later] == [(faults.since_ns[0] + PERIOD_NS,)]  # when it was seen last
+        assert [faults.gone_ns for faults in later] == [(faults.since_ns[0] + PERIOD_NS,)]
         assert later[0].responses == ("flies on",)
 
     def test_the_ruling_goes_before_the_faults(self, node):
