@@ -133,7 +133,8 @@ def run(mutants: list[Mutant], targets: Targets, jobs: int, timeout_s: float) ->
 def preload() -> None:
     """Import once what every test needs and no mutant is; each process is forked from this one."""
     for name in ("pytest", "_pytest.assertion.rewrite", "hypothesis", "hypothesis.stateful", "numpy", "cv2",
-                 "pydantic", "cantools", "typer.testing", "rosbags.typesys"):  # fmt: skip
+                 "pydantic", "cantools",
+                 "typer.testing", "xdist.plugin", "pytest_timeout", "_hypothesis_pytestplugin"):  # fmt: skip
         importlib.import_module(name)
 
 

@@ -124,13 +124,11 @@ def _first_lines(node: ast.stmt) -> str:
 
 def _difference(before: str, statement: ast.stmt, tree: ast.Module, changed: ast.Module) -> str:
     """The head of the changed statement; where it is the same, the line inside that differs."""
-    order = [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
     path = _path_of(tree, statement)
     node: ast.AST = changed
     for field, at in path:
         value = getattr(node, field)
         node = value if at is None else value[at]
-    del order
     assert isinstance(node, ast.stmt)
     after = _first_lines(node)
     if after != before:
@@ -202,7 +200,7 @@ def _changes(node: ast.AST) -> Iterator[Change]:
             yield _constant(node.value * 0.9 if node.value else -1.0)
         case ast.If() | ast.IfExp() | ast.While():
             yield _negated
-        case ast.Return(value=ast.expr()) if not _is_none(node.value):
+        case ast.Return(value=ast.expr()) if not _is_plain(node.value):
             yield lambda _: ast.Return(ast.Constant(None))
         case ast.Expr(value=ast.Yield() | ast.YieldFrom() | ast.Call()):
             yield lambda _: ast.Pass()
@@ -216,8 +214,9 @@ def _is_text(node: ast.BinOp) -> bool:
     return any(isinstance(side, ast.JoinedStr) for side in (node.left, node.right))
 
 
-def _is_none(node: ast.expr | None) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
+def _is_plain(node: ast.expr | None) -> bool:
+    """None already; or true or false, which are changed by themselves."""
+    return isinstance(node, ast.Constant) and (node.value is None or isinstance(node.value, bool))
 
 
 def _comparing(at: int, other: type[ast.cmpop]) -> Change:

@@ -137,7 +137,7 @@ class Transition:
     after: Mode
     who: Who
     cause: str
-    is_gated: bool = False
+    is_gated: bool
 
 
 def _row(

@@ -362,6 +362,12 @@ class TestPresses:
         assert made.press(PERSON, 1, 1)
         assert (made.mode, made.memory.cause) == (Mode.STOPPED, "stopped on the ground")
 
+    def test_the_first_press_after_a_restart_while_it_lands_is_no_second_one(self):
+        made = machine(Mode.LANDED)
+        made.recall(replace(OF_MODE[Mode.LANDING], is_stop_latched=True), 0)
+        assert made.press(PERSON, 1, 1)
+        assert made.memory.cause == "stopped: lands"
+
     def test_the_last_sixty_four_presses_are_known(self):
         made = machine()
         for press_id in range(65):
