@@ -33,6 +33,9 @@ ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {
     ast.BitOr: ast.BitAnd,
     ast.LShift: ast.RShift,
 }
+LARGE = 1000
+"""Whole numbers from here on are nanoseconds or sizes: one more is nothing, a tenth more is not."""
+Shown = ast.stmt | ast.expr
 Change = Callable[[ast.AST], ast.AST]
 
 
@@ -100,12 +103,13 @@ def _changed(source: str, index: int, change: Change) -> ast.Module:
     return ast.fix_missing_locations(swapped)
 
 
-def _statements(tree: ast.Module) -> dict[ast.AST, ast.stmt]:
-    """The innermost statement of each node."""
-    found: dict[ast.AST, ast.stmt] = {}
+def _statements(tree: ast.Module) -> dict[ast.AST, Shown]:
+    """The innermost statement of each node; in a table, the row."""
+    found: dict[ast.AST, Shown] = {}
 
-    def go(node: ast.AST, inside: ast.stmt | None) -> None:
-        inside = node if isinstance(node, ast.stmt) else inside
+    def go(node: ast.AST, inside: Shown | None) -> None:
+        is_row = isinstance(node, ast.Call) and isinstance(inside, ast.Assign | ast.AnnAssign)
+        inside = node if isinstance(node, ast.stmt) or is_row else inside
         if inside is not None:
             found[node] = inside
         for child in ast.iter_child_nodes(node):
@@ -115,21 +119,21 @@ def _statements(tree: ast.Module) -> dict[ast.AST, ast.stmt]:
     return found
 
 
-def _first_lines(node: ast.stmt) -> str:
+def _first_lines(node: Shown) -> str:
     """A statement in one line, of a compound one its head."""
     text = ast.unparse(node)
     lines = text.splitlines()
     return next((line for line in lines if not line.startswith("@")), text)
 
 
-def _difference(before: str, statement: ast.stmt, tree: ast.Module, changed: ast.Module) -> str:
+def _difference(before: str, statement: Shown, tree: ast.Module, changed: ast.Module) -> str:
     """The head of the changed statement; where it is the same, the line inside that differs."""
     path = _path_of(tree, statement)
     node: ast.AST = changed
     for field, at in path:
         value = getattr(node, field)
         node = value if at is None else value[at]
-    assert isinstance(node, ast.stmt)
+    assert isinstance(node, ast.stmt | ast.expr)
     after = _first_lines(node)
     if after != before:
         return after
@@ -192,9 +196,12 @@ def _changes(node: ast.AST) -> Iterator[Change]:
             yield lambda found: found.operand  # type: ignore[attr-defined,no-any-return]
         case ast.Constant(value=bool()):
             yield _constant(not node.value)
-        case ast.Constant(value=int()):
+        case ast.Constant(value=int()) if abs(node.value) < LARGE:
             yield _constant(node.value + 1)
             yield _constant(node.value - 1)
+        case ast.Constant(value=int()):
+            yield _constant(node.value + node.value // 10)
+            yield _constant(node.value - node.value // 10)
         case ast.Constant(value=float()):
             yield _constant(node.value * 1.1 if node.value else 1.0)
             yield _constant(node.value * 0.9 if node.value else -1.0)

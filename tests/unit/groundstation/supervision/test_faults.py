@@ -93,8 +93,8 @@ def test_a_fault_that_flickers_is_one_fault(board):
 
 
 def test_a_step_of_the_response_is_a_change(board):
-    board.look(0, {"grows": ""})
-    changes = [half for half in range(1, 9) if board.look(half * S // 2, {"grows": ""})]
+    board.look(5 * S, {"grows": ""})
+    changes = [half for half in range(1, 9) if board.look(5 * S + half * S // 2, {"grows": ""})]
     assert changes == [4, 6]
 
 
