@@ -122,7 +122,7 @@ class ModeMachine:
             The reason why it does not count in this mode; empty if it does.
         """
         row = transition(self.mode, event)
-        if row is None or (event is Event.RESUME and self.then is Then.LAND):
+        if row is None or not self._may_fly_on(event):
             return _refusal(event, self.memory)
         if author and row.who is Who.STATION:
             return f"{event} is for the station itself to decide"
@@ -133,7 +133,7 @@ class ModeMachine:
         if after is Mode.LANDED and event is Event.AIR_IS_OFF:
             after = self._grounded()
         words = f"{row.cause}: {cause}" if cause else row.cause
-        keeps_cause = event in _KEEPS_CAUSE and not cause
+        keeps_cause = (event, self.mode) in _KEEPS_CAUSE and not cause
         stays = after is self.mode
         self.memory = replace(
             self.memory,
@@ -143,6 +143,11 @@ class ModeMachine:
             since_ns=self.memory.since_ns if stays else now_ns,
         )
         return ""
+
+    def _may_fly_on(self, event: Event) -> bool:
+        """Whether braking was not begun for something stronger than what the event takes back."""
+        strongest = {Event.RESUME: Then.HOLD, Event.FAULTS_GONE: Then.FLY}.get(event, Then.LAND)
+        return self.then <= strongest
 
     def _grounded(self) -> Mode:
         if self.memory.is_stop_latched:
@@ -193,17 +198,23 @@ class ModeMachine:
             self.apply(Event.HELD, now_ns)
 
 
-_KEEPS_CAUSE = frozenset({Event.AT_REST, Event.HELD, Event.AIR_IS_OFF})
-"""Events that carry on what something else began: its cause stays the one to be shown."""
+_KEEPS_CAUSE = frozenset(
+    {
+        (Event.AT_REST, Mode.BRAKING),
+        (Event.HELD, Mode.HOLDING),
+        (Event.AIR_IS_OFF, Mode.LANDING),
+    }
+)
+"""Events that carry on, in a mode, what something else began: its cause stays the one to be shown."""
 
 
 def _refusal(event: Event, memory: Memory) -> str:
-    if memory.is_stop_latched:
+    if memory.is_stop_latched and event is not Event.RELEASE:
         whose = f" by {memory.author}" if memory.author else ""
         return f"a stop is latched{whose}: release it first"
     if memory.mode in BRAKEABLE and event is Event.RESUME:
         return f"it is about to land: {memory.cause}"
-    hint = _HINTS.get(event)
+    hint = _HINTS.get(event) if not memory.is_stop_latched else "wait until it is down"
     return f"{event} does not count while it is {memory.mode}" + (f": {hint}" if hint else "")
 
 

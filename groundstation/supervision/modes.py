@@ -137,7 +137,7 @@ class Transition:
     after: Mode
     who: Who
     cause: str
-    is_gated: bool = False
+    is_gated: bool
 
 
 def _row(
@@ -165,7 +165,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     _row(_E.AIR_IS_ON, (_M.ARMED,), _M.FLYING, _W.STATION, "the float air carries it"),
     _row(_E.AIR_IS_OFF, (_M.FLYING, _M.BRAKING, _M.HOLDING, _M.FLOATING), _M.LANDING, _W.STATION,
          "its valve node reports that the float air is off"),
-    _row(_E.BRAKE, BRAKEABLE, _M.BRAKING, _W.PERSON, "brakes by request"),
+    _row(_E.BRAKE, (_M.FLYING, _M.BRAKING), _M.BRAKING, _W.PERSON, "brakes by request"),
+    _row(_E.BRAKE, (_M.HOLDING,), _M.HOLDING, _W.PERSON, "brakes by request"),
     _row(_E.RESUME, BRAKEABLE, _M.FLYING, _W.PERSON, "resumed by request"),
     _row(_E.FAULT_HOLDS, (_M.FLYING,), _M.BRAKING, _W.STATION, "brakes for a fault"),
     _row(_E.FAULT_LANDS, BRAKEABLE, _M.BRAKING, _W.STATION, "brakes for a fault, then lands"),

@@ -155,8 +155,7 @@ class Supervisor:
         worst = self.board.worst()
         machine = self._machine
         if worst is None:
-            if machine.then is Then.FLY and self.mode in (Mode.BRAKING, Mode.HOLDING):
-                machine.apply(Event.FAULTS_GONE, now_ns)
+            machine.apply(Event.FAULTS_GONE, now_ns)
             return
         event = _EVENTS[worst.response]
         if self._is_due(event) and not machine.apply(event, now_ns, cause=_words(worst)):
