@@ -6,7 +6,8 @@ import pickle
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
@@ -19,7 +20,7 @@ from groundstation.recording.policy import ImagePolicy
 from groundstation.rig.plan import gives_way, resolved_ports
 from groundstation.rig.read import parse_rig
 from groundstation.runners.live import LiveProcess
-from groundstation.runners.slot import Sequences
+from groundstation.runners.slot import Sequences, Slot
 from groundstation.runners.step import build_slots
 
 SWITCH_INTERVAL_S = 0.0005
@@ -101,7 +102,7 @@ def run(orders: Orders) -> None:
     if go is None:
         return
     ports = resolved_ports(rig, orders.process, go.addresses)
-    with ZenohBus(orders.endpoint) as bus:
+    with ZenohBus(orders.endpoint) as bus, _apart(orders.endpoint, slots) as apart:
         process = LiveProcess(
             orders.process,
             slots,
@@ -111,6 +112,13 @@ def run(orders: Orders) -> None:
             journal,
             sequences,
             images=ImagePolicy(rig.record.images),
+            apart=apart,
         )
         stop_when_asked(process.stop)
         process.run()
+
+
+def _apart(endpoint: str, slots: Iterable[Slot]) -> AbstractContextManager[ZenohBus | None]:
+    """A session for topics that wait behind nothing, where a node here receives or publishes one."""
+    kinds = (kind for slot in slots for kind in (*slot.node.inputs, *slot.node.outputs))
+    return ZenohBus(endpoint) if any(kind.TOPIC.is_apart for kind in kinds) else nullcontext()

@@ -10,8 +10,8 @@ from groundstation.declarations.port import Port
 from groundstation.declarations.rig import LABORATORY, STATION, Rig
 
 RECORDER = "recorder"
-NOT_VEHICLES = frozenset({"rig", "record", "alive"})
-"""First words of keys on the bus that stand for something else than a vehicle."""
+NOT_VEHICLES = frozenset({"rig", "record", "alive", "all"})
+"""First words of keys on the bus, and of requests, that stand for something else than a vehicle."""
 
 
 class Placed(NamedTuple):

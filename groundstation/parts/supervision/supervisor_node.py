@@ -70,8 +70,9 @@ class SupervisorNode(Node):
                 self._supervisor.press(message.author, message.press_id, now_ns)
                 yield from self._rule(now_ns)
             case Request() if self._answers(message.action):
-                yield answer(message, now_ns, self._carry_out(message, now_ns))
-                yield from self._rule(now_ns)
+                reason = self._carry_out(message, now_ns)
+                yield from self._rule(now_ns)  # first: what is answered has been kept
+                yield answer(message, now_ns, reason)
             case Recalled():
                 memory = memory_of(message)
                 if memory is not None:
