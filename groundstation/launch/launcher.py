@@ -109,6 +109,12 @@ class Launcher:
         """Names of the processes that are not ready."""
         return [child.name for child in self.children if not child.is_ready]
 
+    @property
+    def recording_trouble(self) -> str:
+        """Why the recording could not be written to its end; known after ``close``, empty where it could."""
+        child = self._children.get(RECORDER)
+        return child.last_words if child is not None and child.code == process.TROUBLE else ""
+
     def received(self, name: str) -> None:
         """Note a sign of life of a process: a batch of its record stream; called from the bus's thread."""
         child = self._children.get(name)

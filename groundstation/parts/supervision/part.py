@@ -9,6 +9,7 @@ from groundstation.parts.control.sections import neighbours_of
 from groundstation.parts.fusion.sections import FusionOfType, fix_payloads
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
+from groundstation.parts.supervision.figures import SupervisionFigure
 from groundstation.parts.supervision.gauges import GAUGES
 from groundstation.parts.supervision.memory import MemoryPort
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
@@ -68,4 +69,5 @@ PART = Part(
     actions=tuple(ACTIONS.values()),
     vehicle=SupervisionOfVehicle,
     gauges=GAUGES,
+    figures=(SupervisionFigure,),
 )

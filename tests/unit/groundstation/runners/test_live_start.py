@@ -1,4 +1,4 @@
-"""How a live process begins: it remembers first, then the bus and other ports are let in; a stop overtakes."""
+"""How a live process begins: it remembers first, then bus and other ports are let in; a stop overtakes."""
 
 import json
 import queue
