@@ -1,5 +1,6 @@
 """``groundstation run``: fly the vehicles of a rig, live or in lockstep."""
 
+import getpass
 import signal
 import sys
 import time
@@ -12,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from groundstation.cli.keys import HELP, Keys, stdin_descriptor
 from groundstation.cli.terminal_view import TerminalView
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
@@ -106,9 +108,10 @@ class _Ending:
     def __init__(self) -> None:
         self.asked = False
         for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(kind, self._ask)
+            signal.signal(kind, self.ask)
 
-    def _ask(self, number: int, frame: FrameType | None) -> None:
+    def ask(self, number: int = 0, frame: FrameType | None = None) -> None:
+        """Ask for the end."""
         del number, frame
         self.asked = True
 
@@ -121,7 +124,17 @@ def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
         live.start(lambda: ending.asked)
         until_s = None
         next_line_s = 0.0
-        with view.opened(headless=headless):
+        keys = Keys(
+            stdin_descriptor(),
+            live.launcher.endpoint,
+            tuple(live.rig.vehicles),
+            getpass.getuser(),
+            live.monitor.note,
+            ending.ask,
+        )
+        if ending.asked:
+            return
+        with keys, view.opened(headless=headless, keys=HELP if keys.are_read else ""):
             while not ending.asked:
                 live.step(REFRESH_S)
                 now_s = time.monotonic()
