@@ -23,6 +23,8 @@ _NUMBERS = {"ignore_unknown_options": True}
 ALL = "all"
 FOR_ALL = ("stop", "land", "release", "fly", "disarm", "float_off")
 """Actions that all vehicles can be asked for at once."""
+OF_RIG = ("take_control", "give_control")
+"""Actions that concern the rig: asked for once, whatever vehicle is named."""
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -82,7 +84,7 @@ def request(
         given = row.check(_values(row, words))
     except ArgumentError as error:
         raise UsageError(str(error)) from error
-    if vehicle == ALL and action not in FOR_ALL:
+    if vehicle == ALL and action not in (*FOR_ALL, *OF_RIG):
         raise UsageError(f"{action} is asked of one vehicle; all can be asked to {', '.join(FOR_ALL)}")
     runs = choose_runs(pid) if vehicle == ALL else [choose_run(vehicle, pid)]
     author = name or getpass.getuser()
@@ -119,6 +121,8 @@ def _ask(
     run: RunningRig, vehicle: str, action: str, given: Mapping[str, Value], author: str, timeout_s: float
 ) -> list[_Answer]:
     vehicles = run.vehicles if vehicle == ALL else (vehicle,)
+    if action in OF_RIG:
+        vehicles = ("",)
     acks = ask_each(run.endpoint, vehicles, action, given, author, timeout_s)
     if len(vehicles) == 1 and not acks:
         raise GroundStationError(silence(vehicles[0], timeout_s))
@@ -127,8 +131,8 @@ def _ask(
 
 def _answer(vehicle: str, ack: Ack | None, timeout_s: float) -> _Answer:
     if ack is None:
-        return _Answer(vehicle, f"no answer within {timeout_s:g} s", False)
-    return _Answer(vehicle, "accepted" if ack.accepted else f"refused: {ack.reason}", ack.accepted)
+        return _Answer(vehicle or ALL, f"no answer within {timeout_s:g} s", False)
+    return _Answer(vehicle or ALL, "accepted" if ack.accepted else f"refused: {ack.reason}", ack.accepted)
 
 
 def _stop(run: RunningRig, vehicle: str, author: str, timeout_s: float) -> list[_Answer]:
