@@ -14,6 +14,7 @@ from typing import Any, Self
 from groundstation.declarations.errors import GroundStationError
 from groundstation.launch.asking import publish, requests_of, session_with
 from groundstation.launch.stop_button import REPEAT_S, StopButton
+from groundstation.launch.urgency import going_first
 
 HELP = "space: stop all   l: land all   q: end"
 BACKGROUND_S = 0.5
@@ -98,7 +99,7 @@ class Keys:
 
     def _run(self) -> None:
         try:
-            with session_with(self._endpoint) as bus:
+            with going_first(), session_with(self._endpoint) as bus:
                 button = StopButton(bus, self._vehicles, self._author)
                 while True:
                     wait_s = 0.0 if button.is_pending else None

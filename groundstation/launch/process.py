@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
@@ -16,6 +16,7 @@ from groundstation.declarations.errors import GroundStationError, RigError, Usag
 from groundstation.files.errors import FileError
 from groundstation.launch.child import REFUSAL
 from groundstation.launch.orders import Go, Orders
+from groundstation.launch.urgency import go_first
 from groundstation.recording.policy import ImagePolicy
 from groundstation.rig.plan import gives_way, resolved_ports
 from groundstation.rig.read import parse_rig
@@ -102,7 +103,11 @@ def run(orders: Orders) -> None:
     if go is None:
         return
     ports = resolved_ports(rig, orders.process, go.addresses)
-    with ZenohBus(orders.endpoint) as bus, _apart(orders.endpoint, slots) as apart:
+    carries_stop = _has_topics_apart(slots)
+    if carries_stop:
+        go_first()  # before any session or port starts a thread
+    apart_session = ZenohBus(orders.endpoint) if carries_stop else nullcontext()
+    with ZenohBus(orders.endpoint) as bus, apart_session as apart:
         process = LiveProcess(
             orders.process,
             slots,
@@ -118,7 +123,7 @@ def run(orders: Orders) -> None:
         process.run()
 
 
-def _apart(endpoint: str, slots: Iterable[Slot]) -> AbstractContextManager[ZenohBus | None]:
-    """A session for topics that wait behind nothing, where a node here receives or publishes one."""
+def _has_topics_apart(slots: Iterable[Slot]) -> bool:
+    """Whether a node here receives or publishes what waits behind nothing: a stop."""
     kinds = (kind for slot in slots for kind in (*slot.node.inputs, *slot.node.outputs))
-    return ZenohBus(endpoint) if any(kind.TOPIC.is_apart for kind in kinds) else nullcontext()
+    return any(kind.TOPIC.is_apart for kind in kinds)

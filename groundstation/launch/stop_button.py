@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from groundstation.bus.listener import Listener
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.launch.asking import fresh_number, publish, session_with
+from groundstation.launch.urgency import going_first
 from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.supervision.modes import Mode
 
@@ -108,7 +109,7 @@ def stop_button(endpoint: str, vehicles: tuple[str, ...], author: str) -> Iterat
     Raises:
         GroundStationError: The hub is not there, or goes away.
     """
-    with session_with(endpoint) as bus:
+    with going_first(), session_with(endpoint) as bus:
         yield StopButton(bus, vehicles, author)
 
 
