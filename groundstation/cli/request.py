@@ -6,21 +6,22 @@ import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
+from typer.core import TyperCommand
 
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.request import Ack, Action, Argument, ArgumentError, Value
 from groundstation.launch.asking import ask_each, silence
 from groundstation.launch.running import RunningRig, choose_run, choose_runs
 from groundstation.launch.stop_button import EVERY, press_stop
-from groundstation.parts.table import installed_tables, own_tables
+from groundstation.parts.supervision.actions import ACTIONS
 
 # "-0.2" is a number and no option
 _NUMBERS = {"ignore_unknown_options": True}
 
-ALL = "all"
+ALL, STOP = "all", "stop"
 FOR_ALL = ("stop", "land", "release", "fly", "disarm", "float_off")
 """Actions that all vehicles can be asked for at once."""
 OF_RIG = ("take_control", "give_control")
@@ -35,7 +36,9 @@ def _shown(argument: Argument) -> str:
 
 @cache
 def _actions() -> Mapping[str, Action]:
-    """All actions; a broken package costs its own ones only, since a stop must pass."""
+    """All actions; a broken package costs its own ones only."""
+    from groundstation.parts.table import installed_tables, own_tables  # half a second that a stop has not
+
     try:
         return installed_tables().actions
     except UsageError as error:
@@ -48,10 +51,15 @@ def _described() -> str:
     return "\n\n".join(" ".join([row.name, *map(_shown, row.arguments)]) + f": {row.summary}" for row in rows)
 
 
-@app.command(
-    context_settings=_NUMBERS,
-    epilog=f"Actions and their arguments:\n\n{_described()}",
-)
+class _WithActions(TyperCommand):
+    """Its help ends with the table of actions, which is read only then."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 types that typer keeps to itself
+        self.epilog = f"Actions and their arguments:\n\n{_described()}"
+        super().format_epilog(ctx, formatter)
+
+
+@app.command(context_settings=_NUMBERS, cls=_WithActions)
 def request(
     vehicle: Annotated[str, typer.Argument(help="Name of the vehicle, as in the rig file; or all.")],
     action: Annotated[str, typer.Argument(help="What it is to do.")],
@@ -75,7 +83,7 @@ def request(
 
     Example: groundstation request all stop
     """
-    actions = _actions()
+    actions = ACTIONS if action == STOP else _actions()  # a stop waits for no package, broken or not
     row = actions.get(action)
     if row is None:
         raise UsageError(f"there is no action {action!r} (there are {', '.join(actions)})")
@@ -91,7 +99,7 @@ def request(
 
     def work(run: RunningRig) -> list[_Answer]:
         try:
-            if action == "stop":
+            if action == STOP:
                 return _stop(run, EVERY if vehicle == ALL else vehicle, author, timeout)
             return _ask(run, vehicle, action, given, author, timeout)
         except GroundStationError as error:

@@ -13,7 +13,7 @@ _LOWEST = 1
 
 
 def go_first() -> bool:
-    """Let the calling thread, and those that it starts from now on, go first; False if it is not permitted."""
+    """Let this thread, and those that it starts from now on, go first; False if it is not permitted."""
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(_LOWEST))
     except OSError:
