@@ -62,7 +62,7 @@ def test_a_stop_that_is_pressed_while_its_process_is_dead_is_taken_when_it_is_ba
 def test_a_run_in_which_a_fault_lands_a_vehicle_tells_it_and_ends_with_code_1(launch, two_drawn, tmp_path):
     run = launch(two_drawn, "--report", str(tmp_path / "report"))
     run.wait_until_flying()
-    done = run.inject("alpha", "silent_imu", "--for", "8")
+    done = run.inject("alpha", "lost_bytes", "--probability_per_byte", "1", "--for", "8")
     assert done.returncode == 0, done.stdout + done.stderr
     run.wait_for("alpha: landed")
     code, _ = run.end()
