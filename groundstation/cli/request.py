@@ -161,8 +161,8 @@ def _values(row: Action, words: list[str]) -> dict[str, object]:
     """Arguments by name, SI, from words in order or as ``name=value``."""
     names = {_shown(argument): argument for argument in row.arguments}
     if not any("=" in word for word in words):
-        needed = sum(argument.default is None for argument in row.arguments)
-        if not needed <= len(words) <= len(names):
+        least = sum(argument.default is None for argument in row.arguments)
+        if not least <= len(words) <= len(names):
             wanted = " ".join(names) or "no arguments"
             raise ArgumentError(f"{row.name} takes {wanted}, found {len(words)} words")
         pairs = list(zip(names, words, strict=False))

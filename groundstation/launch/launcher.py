@@ -117,7 +117,7 @@ class Launcher:
         return child.last_words if child is not None and child.code == process.TROUBLE else ""
 
     def received(self, name: str) -> None:
-        """Note a sign of life of a process: a batch of its record stream; called from the bus's thread."""
+        """Note a sign of life of a process: a batch of its record stream."""
         child = self._children.get(name)
         if child is not None:
             child.last_sign_s = self._time.now_s

@@ -1,7 +1,6 @@
 """A whole live run of a rig: launcher, monitor and latency; what the terminal view looks at."""
 
 import os
-import queue
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
-from groundstation.bus.zenoh_bus import RECORD, split_key
+from groundstation.bus.zenoh_bus import RECORD, Mailbox, split_key
 from groundstation.declarations.rig import Rig
 from groundstation.launch.launcher import Launcher
 from groundstation.launch.running import RunningRig
@@ -19,6 +18,8 @@ from groundstation.watch.monitor import Monitor
 
 LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05
+MOST_BATCHES = 4096
+"""Of record streams, half a minute's; a launcher that is kept from looking for longer loses the oldest."""
 PROCESS = "launcher"
 """Whose record stream the latency is in."""
 
@@ -40,7 +41,7 @@ class LiveRun:
         self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
-        self._batches: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._batches: Mailbox | None = None
         self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
@@ -61,18 +62,19 @@ class LiveRun:
         self._announcement = run.announce()
         bus = self.launcher.bus
         assert bus is not None
-        bus.subscribe(f"{RECORD}/*", self._receive)
+        self._batches = bus.collect(f"{RECORD}/*", MOST_BATCHES)
 
     def step(self, duration_s: float) -> None:
         """Supervise and take what is published for a while."""
         until_s = time.monotonic() + duration_s
         while (now_s := time.monotonic()) < until_s:
+            self._take()
             self.launcher.supervise()
-            self._take(min(until_s, now_s + POLL_S))
             if now_s >= self._latency_due_s:
                 self._latency_due_s = now_s + LATENCY_PERIOD_S
                 self._publish_latency()
                 self.monitor.look(time.monotonic_ns())
+            time.sleep(min(POLL_S, max(until_s - time.monotonic(), 0.0)))  # all at once costs least
 
     def close(self) -> None:
         """End everything in good order."""
@@ -80,27 +82,21 @@ class LiveRun:
             self._announcement.unlink(missing_ok=True)
         self.launcher.close()
 
-    def _receive(self, key: str, batch: bytes, _attachment: bytes) -> None:
-        """A batch of a process, on Zenoh's thread."""
-        process = split_key(key)[1]
-        self.launcher.received(process)
-        self._batches.put((process, batch))
-
-    def _take(self, until_s: float) -> None:
-        """Let the monitor have what comes, until a moment of the monotonic clock."""
-        while (left_s := until_s - time.monotonic()) > 0:
-            try:
-                process, batch = self._batches.get(timeout=left_s)
-            except queue.Empty:
-                return
+    def _take(self) -> None:
+        """Let the monitor have what has come; each batch is a sign of life."""
+        if self._batches is None:
+            return
+        now_ns = time.monotonic_ns()
+        for key, batch in self._batches.take():
+            process = split_key(key)[1]
             if process == PROCESS:
                 continue
+            self.launcher.received(process)
             try:
-                entries = read_batch(batch)
+                entries = read_batch(batch, self.monitor.nouns)
             except BatchError as error:
                 self.monitor.note(f"{process}: {error}")
                 continue
-            now_ns = time.monotonic_ns()
             for entry in entries:
                 if not self._is_repeated(entry):
                     self.monitor.take(entry, now_ns)

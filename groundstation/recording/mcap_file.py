@@ -57,6 +57,7 @@ class McapFile:
 
     def __init__(self, file: BinaryIO, profile: str, library: str) -> None:
         self._file = file
+        self._compress = zstandard.ZstdCompressor().compress
         self._parts: list[bytes] = []  # of the open chunk
         self._size = 0
         self._stamps_and_offsets: dict[int, list[int]] = {}  # of the open chunk, by channel
@@ -161,7 +162,7 @@ class McapFile:
         if not self._stamps_and_offsets:
             return
         records = b"".join(self._parts)
-        packed = zstandard.compress(records)
+        packed = self._compress(records)
         low_ns = min(min(index[::2]) for index in self._stamps_and_offsets.values())
         high_ns = max(max(index[::2]) for index in self._stamps_and_offsets.values())
         start = self._file.tell()

@@ -63,12 +63,14 @@ class Step:
         self._sequences = sequences
         self._transport = transport
         self._receivers: dict[Address, list[Slot]] = {}
-        self._paces: dict[Address, dict[str, Pace]] = {}  # of the slots that take it paced, by their keys
+        self._takers: dict[
+            Address, list[tuple[Slot, Pace | None]]
+        ] = {}  # with the pace of who takes it paced
         for slot in slots:
             for kind, address in inputs_of(slot.node):
+                pace = Pace(kind.TOPIC.pace_ns) if kind in slot.node.paced else None
                 self._receivers.setdefault(address, []).append(slot)
-                if kind in slot.node.paced:
-                    self._paces.setdefault(address, {})[slot.key] = Pace(kind.TOPIC.pace_ns)
+                self._takers.setdefault(address, []).append((slot, pace))
         self._writers: dict[Address, Port] = {
             (kind.TOPIC.noun, vehicle): port for port in ports for kind, vehicle in port.writes()
         }
@@ -80,7 +82,7 @@ class Step:
 
     def is_paced(self, address: Address) -> bool:
         """Whether all who receive it here take it paced."""
-        return len(self._paces.get(address, ())) == len(self._receivers[address])
+        return all(pace is not None for _, pace in self._takers[address])
 
     def writer_of(self, payload: Message) -> Port | None:
         """The port that a message leaves through; None where it leaves through none."""
@@ -117,21 +119,12 @@ class Step:
         port = self.writer_of(payload)
         if port is not None:
             self._transport.write(port, payload, now_ns)
-        self.receive(delivered, now_ns)
+        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
 
     def receive(self, delivered: Delivered, now_ns: int) -> None:
         """Give a message of another process to the nodes that receive it."""
         payload = delivered.payload
-        address = payload.TOPIC.noun, payload.vehicle
-        paces = self._paces.get(address)
-        for slot in self._receivers.get(address, ()):
-            pace = None if paces is None else paces.get(slot.key)
-            if pace is not None and not pace.passes(delivered.envelope.publish_ns):
-                continue
-            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
-                self._hand_over(slot, delivered, now_ns)
-            else:
-                self._wait(slot, delivered, now_ns)
+        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
 
     def free(self, slot: Slot, now_ns: int) -> None:
         """A busy node is done: it takes what has waited longest."""
@@ -145,6 +138,15 @@ class Step:
         topic = Journal.TOPIC
         sequence = self._sequences.next(topic, self.process)
         return Delivered(Envelope(topic, self.process, sequence, now_ns), payload)
+
+    def _give(self, address: Address, delivered: Delivered, now_ns: int) -> None:
+        for slot, pace in self._takers.get(address, ()):
+            if pace is not None and not pace.passes(delivered.envelope.publish_ns):
+                continue
+            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
+                self._hand_over(slot, delivered, now_ns)
+            else:
+                self._wait(slot, delivered, now_ns)
 
     def _wait(self, slot: Slot, delivered: Delivered, now_ns: int) -> None:
         """Let a message wait for a busy node; of a topic with newest delivery only the last one waits."""

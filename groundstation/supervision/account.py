@@ -54,7 +54,7 @@ class Account:
         ids: Sequence[str],
         details: Sequence[str],
         responses: Sequence[str],
-        there: Sequence[float],
+        there: Sequence[bool],
     ) -> None:
         """Every fault that stands; one that is only latched is over."""
         now = {

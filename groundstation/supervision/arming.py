@@ -10,6 +10,7 @@ from groundstation.supervision.sightings import Sightings
 NEAREST_M = 0.45
 """Between the centres of two mock-ups at take-off: both bodies, and the way that one drifts first."""
 OLDEST_FIX_S = 3.0
+AGREEING = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,10 @@ def _fixes(question: Question) -> str:
     own, age_s = question.sightings.own, question.sightings.fix_age_s
     if own is None or own.status != "flying":
         return "no agreeing fixes have placed it yet"
-    return "" if age_s <= OLDEST_FIX_S else f"the newest fix is {age_s:.1f} s old"
+    if age_s > OLDEST_FIX_S:
+        return f"the newest fix is {age_s:.1f} s old"
+    agreeing = question.sightings.agreeing
+    return "" if agreeing >= AGREEING else f"{agreeing} fixes agree, {AGREEING} are asked for"
 
 
 def _pose(question: Question) -> str:

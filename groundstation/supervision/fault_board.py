@@ -26,11 +26,12 @@ class Standing:
     seen_ns: int
     is_there: bool = True
 
-    def response(self, now_ns: int) -> Response:
-        """What is due now; of one that is gone and only latched, nothing more."""
+    @property
+    def response(self) -> Response:
+        """What is due for as long as it was seen; of one that is gone and only latched, nothing more."""
         if not self.is_there:
             return Response.NOTE
-        return self.fault.response((now_ns - self.since_ns) * 1e-9)
+        return self.fault.response((self.seen_ns - self.since_ns) * 1e-9)
 
 
 class FaultBoard:
@@ -43,6 +44,8 @@ class FaultBoard:
     def __init__(self, faults: Mapping[str, Fault] = FAULTS) -> None:
         self._faults = faults
         self._standing: dict[str, Standing] = {}
+        self._shown: list[tuple[str, bool, Response]] = []
+        self._suspected_ns: dict[str, int] = {}  # since when what is not confirmed yet is seen
 
     def __iter__(self) -> Iterator[Standing]:
         """Those that stand, oldest first."""
@@ -52,34 +55,33 @@ class FaultBoard:
         return fault_id in self._standing
 
     def look(self, now_ns: int, found: Mapping[str, str]) -> bool:
-        """Take what is found wrong at this moment, by id with details; True if a fault began or ended.
+        """Take what is found wrong at this moment, by id with details; True if anything has changed.
 
         Raises:
             KeyError: The table has no such fault.
         """
-        changed = False
+        self._suspected_ns = {fault_id: self._suspected_ns.get(fault_id, now_ns) for fault_id in found}
         for fault_id, detail in found.items():
-            standing = self._standing.get(fault_id)
-            if standing is None:
-                fault = self._faults[fault_id]
-                self._standing[fault_id] = Standing(fault, detail, now_ns, now_ns)
-                changed = True
-                continue
-            if not standing.is_there:
-                standing.is_there, standing.since_ns = True, now_ns
-                standing.detail = detail
-                changed = True
-            standing.seen_ns = now_ns
+            fault = self._faults[fault_id]
+            if now_ns - self._suspected_ns[fault_id] >= fault.confirm_s * 1e9:
+                self._see(fault, detail, now_ns)
         for fault_id, standing in tuple(self._standing.items()):
-            if fault_id in found or now_ns - standing.seen_ns < _CLEAR_NS:
+            if standing.seen_ns == now_ns or now_ns - standing.seen_ns < _CLEAR_NS:
                 continue
             if standing.fault.clears is Clears.ITSELF:
                 del self._standing[fault_id]
-                changed = True
-            elif standing.is_there:
+            else:
                 standing.is_there = False
-                changed = True
-        return changed
+        shown = [(row.fault.id, row.is_there, row.response) for row in self]
+        has_changed, self._shown = shown != self._shown, shown
+        return has_changed
+
+    def _see(self, fault: Fault, detail: str, now_ns: int) -> None:
+        standing = self._standing.get(fault.id)
+        if standing is None or not standing.is_there:  # one that comes again begins again
+            self._standing[fault.id] = Standing(fault, detail, now_ns, now_ns)
+        else:
+            standing.seen_ns = now_ns
 
     def clear(self) -> bool:
         """A person clears what is gone; True if anything was."""
@@ -88,11 +90,10 @@ class FaultBoard:
             del self._standing[fault_id]
         return bool(gone)
 
-    def worst(self, now_ns: int) -> Standing | None:
+    def worst(self) -> Standing | None:
         """The fault whose response is strongest now, the oldest of equals; None where nothing is due."""
         worst, due = None, Response.NOTE
         for standing in self._standing.values():
-            response = standing.response(now_ns)
-            if response > due:
-                worst, due = standing, response
+            if standing.response > due:
+                worst, due = standing, standing.response
         return worst

@@ -53,6 +53,7 @@ class Fault:
         may_be_overridden: A person may arm in spite of it, with a reason.
         advice: What a person can do.
         failures: What the emulator can do to provoke it; empty where tests kill processes instead.
+        confirm_s: So long without a break it must be seen: what may be on its way is none.
     """
 
     id: str
@@ -65,6 +66,7 @@ class Fault:
     may_be_overridden: bool
     advice: str
     failures: tuple[str, ...] = ()
+    confirm_s: float = 0.0
 
     def response(self, age_s: float) -> Response:
         """What is due when it has lasted for a while."""
@@ -115,9 +117,12 @@ FAULTS: Mapping[str, Fault] = {
         Fault("imu_silent", "Nothing comes from the IMU block.", "no sample for 0.15 s", 0.3,
               ((0.0, _LAND), (1.5, _CUT)), _ITSELF, True, False,
               "Look at the block's cable and supply.", ("silent_imu", "lost_bytes")),
-        Fault("imu_stuck", "A sensor of the IMU repeats one value.", "the reader's plausibility checks", 0.7,
+        Fault("accelerometer_lost", "An accelerometer is not believed; gyro, fixes and commands stand in.",
+              "the reader's plausibility checks", 0.3,
+              ((0.0, _NOTE),), _ITSELF, True, True, "Replace its chip.", ("dead_tilt",)),
+        Fault("imu_stuck", "The gyro repeats one value.", "the reader's plausibility checks", 0.8,
               ((0.0, _LAND), (1.5, _CUT)), _PERSON, True, False,
-              "Replace the block, or its chip.", ("stuck_gyro", "dead_tilt")),
+              "Replace the block, or its chip.", ("stuck_gyro",)),
         Fault("imu_implausible", "Samples of the IMU cannot be true.", "the reader's plausibility checks",
               0.5, ((0.0, _LAND), (1.5, _CUT)), _ITSELF, True, False,
               "See the reason; calibrate the block."),
@@ -127,7 +132,7 @@ FAULTS: Mapping[str, Fault] = {
               "Connect the right block, or correct the rig.", ("other_imu",)),
         Fault("imu_shifted", "A zero offset of the IMU has stepped.",
               "fixes that contradict the IMU one-sidedly, or an offset beyond what it may be", 1.0,
-              ((0.0, _LAND),), _PERSON, True, True,
+              ((0.0, _LAND), (2.0, _CUT)), _PERSON, True, True,
               "Calibrate the block at rest again.", ("shifted_imu",)),
         Fault("imu_clock_jumped", "The tick counter of the IMU block has jumped.",
               "ticks against arrivals", 0.5,
@@ -138,7 +143,7 @@ FAULTS: Mapping[str, Fault] = {
         # -- what pushes it -------------------------------------------------------------------------
         Fault("valve_stuck_open", "A valve pushes that nobody opened.",
               "acceleration against the commands", 2.0,
-              ((0.0, _LAND),), _PERSON, True, False, "Clean or replace the valve.",
+              ((0.0, _LAND), (3.0, _CUT)), _PERSON, True, False, "Clean or replace the valve.",
               ("stuck_open_valve", "leaking_valve", "pulsing_valve")),
         Fault("valve_stuck_closed", "A valve does not push when it is opened.",
               "acceleration against the commands", 1.0,
@@ -161,7 +166,8 @@ FAULTS: Mapping[str, Fault] = {
               ((0.0, _LAND),), _ITSELF, True, False, "Find the babbling node.", ("flooded_bus",)),
         Fault("node_disobeys", "The valve node is disarmed, or closed by its dead man, in flight.",
               "its status against what is commanded", 0.5,
-              ((0.0, _NOTE), (0.5, _CUT)), _ITSELF, False, False, "See whether the node was reset."),
+              ((0.0, _NOTE), (0.5, _CUT)), _ITSELF, False, False, "See whether the node was reset.",
+              confirm_s=0.2),
         # -- where it may go ------------------------------------------------------------------------
         Fault("edge_ahead", "It would not stop before the edge of the table.",
               "its stopping distance", 0.1,

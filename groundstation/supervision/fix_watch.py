@@ -10,7 +10,7 @@ KNOWN_INTERVALS = 3
 PERIODS = 3.0
 LASTING_S = 1.0
 REFUSED_IN_A_ROW = 8
-REPEATS, TORN = "repeats", "torn"
+REPEATS, TORN = "repeat", "torn picture"
 """What the reasons of pictures and fixes hold."""
 
 

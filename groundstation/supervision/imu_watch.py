@@ -18,15 +18,19 @@ class ImuWatch:
         self._arrival_ns: int | None = None
         self._bad_since_ns: int | None = None
         self._reason = ""
+        self._is_rate_usable = True
         self._jump = ""
         self._jump_ns = 0
 
-    def take(self, now_ns: int, *, is_valid: bool, reason: str, elapsed_ms: int) -> None:
+    def take(
+        self, now_ns: int, *, is_valid: bool, is_rate_usable: bool, reason: str, elapsed_ms: int
+    ) -> None:
         """Account for a sample.
 
         Args:
             now_ns: Its arrival.
             is_valid: Whether the reader believes it.
+            is_rate_usable: Whether the reader believes its turn rate at least.
             reason: Why not.
             elapsed_ms: Ticks of the block since the sample before; 0 after a restart of the block.
         """
@@ -41,7 +45,7 @@ class ImuWatch:
             self._bad_since_ns = None
         elif self._bad_since_ns is None:
             self._bad_since_ns = now_ns
-        self._reason = reason
+        self._reason, self._is_rate_usable = reason, is_rate_usable
 
     def findings(self, now_ns: int) -> Iterator[tuple[str, str]]:
         """Faults at this moment, by id with details; nothing before the first sample."""
@@ -51,7 +55,8 @@ class ImuWatch:
         if silent_s > SILENT_S:
             yield "imu_silent", f"the newest sample is {silent_s:.2f} s old"
         elif self._bad_since_ns is not None and now_ns - self._bad_since_ns >= BAD_S * 1e9:
-            yield _fault_of(self._reason), self._reason
+            degraded = "accelerometer_lost"
+            yield degraded if self._is_rate_usable else _fault_of(self._reason), self._reason
         if self._jump and now_ns - self._jump_ns < 1_000_000_000:
             yield "imu_clock_jumped", self._jump
 

@@ -82,6 +82,7 @@ class Sightings:
         findings: What the fault detector found, by id with details.
         findings_ns: Arrival of these.
         fix_age_s: Since the exposure of the newest used fix.
+        agreeing: How many fixes were used since the last one that was refused.
         rest_s: Length of its unbroken rest.
         recorder_ns: Arrival of the recorder's newest status; None where none was ever received.
         recorder_room_s: How long the recording can go on by the room on its disk.
@@ -101,6 +102,7 @@ class Sightings:
     findings: Mapping[str, str] = field(default_factory=dict)
     findings_ns: int | None = None
     fix_age_s: float = math.inf
+    agreeing: int = 0
     rest_s: float = 0.0
     recorder_ns: int | None = None
     recorder_room_s: float = math.inf

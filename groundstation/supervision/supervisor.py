@@ -152,13 +152,13 @@ class Supervisor:
 
     def _respond(self, now_ns: int) -> None:
         """Do what the worst fault asks for; what it asked for before it was gone ends with it."""
-        worst = self.board.worst(now_ns)
+        worst = self.board.worst()
         machine = self._machine
         if worst is None:
             if machine.then is Then.FLY and self.mode in (Mode.BRAKING, Mode.HOLDING):
                 machine.apply(Event.FAULTS_GONE, now_ns)
             return
-        event = _EVENTS[worst.response(now_ns)]
+        event = _EVENTS[worst.response]
         if self._is_due(event) and not machine.apply(event, now_ns, cause=_words(worst)):
             self._ground(worst)
 

@@ -66,7 +66,13 @@ class FaultSummary:
         t_s = (message.stamp_ns - self._began_ns) * 1e-9
         match message:
             case Faults():
-                account.take_faults(t_s, message.ids, message.details, message.responses, message.there)
+                account.take_faults(
+                    t_s,
+                    message.ids,
+                    message.details,
+                    message.responses,
+                    tuple(gone_ns == 0.0 for gone_ns in message.gone_ns),
+                )
             case Supervision():
                 account.take_ruling(
                     t_s, message.mode, message.author, message.cause, is_stop_latched=message.stop_latched

@@ -4,7 +4,6 @@ from typing import Self
 
 from pydantic import model_validator
 
-from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Positive, Section
 from groundstation.fusion.estimators import ESTIMATORS
@@ -42,8 +41,3 @@ def fused_sources(rig: Rig, vehicle: str) -> tuple[str, ...]:
         return named
     every = rig.tables.fix_sources.values()
     return tuple(source.name for source in every if source.condition(rig, vehicle))[:1]
-
-
-def fix_payloads(rig: Rig, vehicle: str) -> tuple[type[PoseFix], ...]:
-    """Return the classes of the fixes that a vehicle's estimator takes."""
-    return tuple(rig.tables.fix_sources[name].payload for name in fused_sources(rig, vehicle))

@@ -22,7 +22,13 @@ class SupervisionFigure(Figure):
     def take(self, message: Message, t_s: float) -> None:
         match message:
             case Faults():
-                self._account.take_faults(t_s, message.ids, message.details, message.responses, message.there)
+                self._account.take_faults(
+                    t_s,
+                    message.ids,
+                    message.details,
+                    message.responses,
+                    tuple(gone_ns == 0.0 for gone_ns in message.gone_ns),
+                )
             case Supervision():
                 self._account.take_ruling(
                     t_s, message.mode, message.author, message.cause, is_stop_latched=message.stop_latched

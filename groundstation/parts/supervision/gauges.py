@@ -73,7 +73,7 @@ class FaultGauge(Gauge):
         assert isinstance(message, Faults)
         there = {}
         for row, fault in enumerate(message.ids):
-            there[fault] = bool(message.there[row])
+            there[fault] = message.gone_ns[row] == 0.0
             if there[fault] and not self._there.get(fault):
                 detail = f" ({message.details[row]})" if message.details[row] else ""
                 yield (
@@ -96,10 +96,16 @@ class FaultGauge(Gauge):
         shown = []
         for row, fault in enumerate(faults.ids):
             age_s = (now_ns - faults.since_ns[row]) * 1e-9
-            is_there = bool(faults.there[row])
+            is_there = faults.gone_ns[row] == 0.0
             state = f"{age_s:.0f} s, {faults.responses[row]}" if is_there else "gone, release clears it"
             shown.append(f"{fault} ({state})")
         return cell(", ".join(shown), Level.BAD)
+
+    def phrase(self, newest: Newest, now_ns: int) -> str:
+        del now_ns
+        faults = newest.get(Faults)
+        count = 0 if faults is None else len(faults.ids)
+        return f"{f'FAULTS {count}' if count else 'no faults':<9}"
 
 
 GAUGES = (GaugeRow(1, ModeGauge), GaugeRow(2, FaultGauge))

@@ -116,7 +116,7 @@ class Faults(Message):
         since_ns: When each was found, as a float.
         responses: What is being done.
         advices: What a person can do.
-        there: 1 where it is there now, 0 where it is only latched: a release clears it.
+        gone_ns: When it was seen last, where it is only latched and a release clears it; 0 while it is there.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Faults"
@@ -127,4 +127,4 @@ class Faults(Message):
     since_ns: Float64Sequence
     responses: TextSequence
     advices: TextSequence
-    there: Float64Sequence
+    gone_ns: Float64Sequence

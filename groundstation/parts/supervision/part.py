@@ -5,8 +5,11 @@ from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Wei
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION, Rig
+from groundstation.fusion.noise import lag_of_bandwidth
 from groundstation.parts.control.sections import neighbours_of
-from groundstation.parts.fusion.sections import FusionOfType, fix_payloads
+from groundstation.parts.fusion.sections import FusionOfType, fused_sources
+from groundstation.parts.imu.sections import ImuOfType
+from groundstation.parts.stars.sections import StarsOfType
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
 from groundstation.parts.supervision.figures import SupervisionFigure
@@ -15,10 +18,14 @@ from groundstation.parts.supervision.memory import MemoryPort
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
 from groundstation.parts.supervision.sections import SupervisionOfVehicle
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
+from groundstation.supervision.imu_consistency import ImuConsistency, ImuConsistencyConfig
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
+from groundstation.supervision.thrust_fit import FitConfig
+from groundstation.supervision.valve_consistency import ValveConsistency, ValveConsistencyConfig
 
 RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
+HEADING_SIGMA_RAD = 0.002  # of fixes that are no camera's
 SLOPE_M_S2 = 0.005  # a table half a milliradian off level
 
 
@@ -49,7 +56,27 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
 
 
 def _detector(rig: Rig, vehicle: str) -> Node:
-    return FaultDetector(vehicle, fix_payloads(rig, vehicle))
+    type_, imu = rig.type_of(vehicle), rig.of_type(vehicle, ImuOfType).imu
+    sources = {rig.tables.fix_sources[name].payload: name for name in fused_sources(rig, vehicle)}
+    floors_rad = [rig.tables.fix_sources[name].floor(rig, vehicle)[1] for name in sources.values()]
+    camera = rig.of_type(vehicle, StarsOfType).star_camera
+    heading_sigma_rad = max(HEADING_SIGMA_RAD if camera is None else camera.sigma_heading_rad, *floors_rad)
+    valves = ValveConsistencyConfig(
+        fit=FitConfig(
+            imu_position_body_m=imu.position_body_m,
+            gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
+            acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
+        ),
+        open_delay_s=type_.valves.open_delay_s,
+        close_delay_s=type_.valves.close_delay_s,
+        rise_s=type_.valves.rise_s,
+        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
+        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
+    )
+    gyro = ImuConsistencyConfig(
+        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz, heading_sigma_rad=heading_sigma_rad
+    )
+    return FaultDetector(vehicle, sources, ValveConsistency(type_.model(), valves), ImuConsistency(gyro))
 
 
 def _memory(rig: Rig, vehicle: str) -> Port:

@@ -53,6 +53,7 @@ class SupervisorNode(Node):
         self._known = known
         self._absent = absent
         self._lease = LeaseCheck()
+        self._fixes = (0, 0)  # used and refused, when they were reported last
         self._published: Ruling | None = None
         self._published_ns = 0
 
@@ -102,6 +103,7 @@ class SupervisorNode(Node):
                     sightings.own = seen
             case FusionStatus():
                 sightings.rest_s, sightings.fix_age_s = message.rest_s, message.fix_age_s
+                self._count_fixes(message)
             case ValveStatus():
                 sightings.node = NodeSeen(
                     now_ns,
@@ -118,6 +120,14 @@ class SupervisorNode(Node):
                 sightings.findings_ns = now_ns
             case RecorderStatus():
                 sightings.recorder_ns, sightings.recorder_room_s = now_ns, message.room_s
+
+    def _count_fixes(self, status: FusionStatus) -> None:
+        used, refused = self._fixes
+        self._fixes = status.fixes_used, status.fixes_refused
+        if status.fixes_refused != refused or status.fixes_used < used:
+            self._supervisor.sightings.agreeing = 0
+        else:
+            self._supervisor.sightings.agreeing += status.fixes_used - used
 
     def _answers(self, action: str) -> bool:
         return action in ACTIONS or action in self._absent or action not in self._known
@@ -173,9 +183,9 @@ class SupervisorNode(Node):
             tuple(row.fault.what for row in rows),
             tuple(row.detail for row in rows),
             tuple(float(row.since_ns) for row in rows),
-            tuple(row.response(now_ns).words for row in rows),
+            tuple(row.response.words for row in rows),
             tuple(row.fault.advice for row in rows),
-            tuple(float(row.is_there) for row in rows),
+            tuple(0.0 if row.is_there else float(row.seen_ns) for row in rows),
         )
 
 

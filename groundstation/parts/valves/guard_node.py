@@ -76,7 +76,8 @@ class GuardNode(Node):
         asked = ruling.may_open, ruling.stop_latched, ruling.grace_s > 0.0
         has_changed, self._obeyed = asked != self._obeyed, asked
         if not ruling.stop_latched:
-            guard.release_stop(now_ns)
+            if guard.stop_reason is not None or guard.is_stop_announced:
+                guard.release_stop(now_ns)
         elif ruling.grace_s > 0.0:
             guard.announce_stop(now_ns, ruling.grace_s)
         elif guard.stop_reason is None:

@@ -28,7 +28,7 @@ def refused(capsys, *words):
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["alpha", "fly_away"], "there is no action 'fly_away' (there are "),
+        (["alpha", "jump"], "there is no action 'jump' (there are fly, "),
         (["alpha", "go_to", "0.1"], "go_to takes x_m y_m heading_deg, found 1 words"),
         (["alpha", "go_to", "-0.1", "nan", "3"], "finite"),
         (["alpha", "stop"], "no rig is running"),

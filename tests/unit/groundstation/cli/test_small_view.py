@@ -29,7 +29,7 @@ def screen_of(vehicles, width=WIDTH, height=HEIGHT, keys=HELP):
             ),
             Faults(
                 now_ns, name, ("star_outage", "low_tank"), ("No fix.", "Gas."), ("7 s", "1 bar"),
-                (float(now_ns), float(now_ns)), ("flies on", "flies on"), ("Look.", "Fill."), (1.0, 1.0),
+                (float(now_ns), float(now_ns)), ("flies on", "flies on"), ("Look.", "Fill."), (0.0, 0.0),
             ),
         ):  # fmt: skip
             monitor.take_delivered(Delivered(Envelope(type(message).TOPIC, name, 1, now_ns), message), now_ns)

@@ -13,9 +13,9 @@ def ruled(account, t_s, mode, author="", cause="", *, latched=False):
 
 def test_a_fault_has_a_beginning_an_end_and_its_last_response():
     account = Account()
-    account.take_faults(1.0, IDS, ("0.15 s old",), NOTES, (1.0,))
-    account.take_faults(1.5, IDS, ("0.65 s old",), LANDS, (1.0,))
-    account.take_faults(2.0, IDS, ("0.65 s old",), NOTES, (0.0,))  # only latched
+    account.take_faults(1.0, IDS, ("0.15 s old",), NOTES, (True,))
+    account.take_faults(1.5, IDS, ("0.65 s old",), LANDS, (True,))
+    account.take_faults(2.0, IDS, ("0.65 s old",), NOTES, (False,))  # only latched
     account.take_faults(2.5, (), (), (), ())
     (episode,) = account.episodes
     assert (episode.id, episode.since_s, episode.until_s) == ("imu_silent", 1.0, 2.0)
@@ -24,14 +24,14 @@ def test_a_fault_has_a_beginning_an_end_and_its_last_response():
 
 def test_a_fault_that_comes_again_is_another_one_and_may_last_to_the_end():
     account = Account()
-    for t_s, there in ((1.0, 1.0), (2.0, 0.0), (3.0, 1.0)):
+    for t_s, there in ((1.0, True), (2.0, False), (3.0, True)):
         account.take_faults(t_s, IDS, ("",), NOTES, (there,))
     assert [(episode.since_s, episode.until_s) for episode in account.episodes] == [(1.0, 2.0), (3.0, None)]
 
 
 def test_a_fault_that_was_latched_before_the_run_is_no_episode():
     account = Account()
-    account.take_faults(0.0, IDS, ("",), NOTES, (0.0,))
+    account.take_faults(0.0, IDS, ("",), NOTES, (False,))
     assert account.episodes == []
 
 

@@ -12,11 +12,12 @@ BEGAN_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000
 
 
-def faults(t_s, *ids, there=1.0):
+def faults(t_s, *ids, there=True):
     every = len(ids)
+    gone_ns = 0.0 if there else BEGAN_NS + t_s * SECOND_NS
     return Faults(
         BEGAN_NS + round(t_s * SECOND_NS), "alpha", ids, ("",) * every, ("0.2 s old",) * every,
-        (0.0,) * every, ("brakes, then lands",) * every, ("",) * every, (there,) * every,
+        (0.0,) * every, ("brakes, then lands",) * every, ("",) * every, (gone_ns,) * every,
     )  # fmt: skip
 
 
@@ -31,7 +32,7 @@ def ruling(t_s, mode, author=""):
 FLIGHT = (
     ruling(0.0, "flying"),
     faults(1.0, "imu_silent"),
-    faults(2.5, "imu_silent", there=0.0),
+    faults(2.5, "imu_silent", there=False),
     ruling(3.0, "landing"),
     faults(4.0, "star_outage"),
 )
