@@ -64,7 +64,7 @@ def test_a_run_in_which_a_fault_lands_a_vehicle_tells_it_and_ends_with_code_1(la
     run.wait_until_flying()
     done = run.inject("alpha", "lost_bytes", "--probability_per_byte", "1", "--for", "8")
     assert done.returncode == 0, done.stdout + done.stderr
-    run.wait_for("alpha: landed")
+    run.wait_for("alpha: landing")
     code, _ = run.end()
     assert code == 1
     assert any(line.startswith("alpha: fault imu_silent from ") for line in run.lines)
