@@ -72,7 +72,7 @@ class Run:
         self.folder = folder
         self._env = os.environ | {
             "XDG_RUNTIME_DIR": str(folder),
-            "XDG_STATE_HOME": str(folder),
+            "XDG_STATE_HOME": str(folder / "state"),
             "OPENBLAS_NUM_THREADS": "1",
         }
         command = [sys.executable, "-m", "groundstation", "run", str(rig), "--headless"]
