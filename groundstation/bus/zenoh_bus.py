@@ -82,10 +82,13 @@ class TopicPublisher:
 
     def __init__(self, session: zenoh.Session, key: str, topic: Topic) -> None:
         newest = topic.delivery is Delivery.NEWEST
+        priority = zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH
+        if topic.is_apart:
+            priority = zenoh.Priority.REAL_TIME
         self._publisher = session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.DROP if newest else zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH,
+            priority=priority,
             express=not newest,
         )
         self._has_subscribers = False
@@ -143,6 +146,7 @@ class ZenohBus:
         self._is_hub = is_hub
         self._session = open_hub(endpoint) if is_hub else zenoh.open(_config("client", connect=(endpoint,)))
         self._publishers: list[TopicPublisher] = []
+        self._at_once: dict[tuple[str, str], TopicPublisher] = {}
         self._record: zenoh.Publisher | None = None
         self._subscribers: list[zenoh.Subscriber[Any]] = []
         self._token: zenoh.LivelinessToken | None = None
@@ -166,6 +170,13 @@ class ZenohBus:
         made = TopicPublisher(self._session, key_of(topic, owner, paced=paced), topic)
         self._publishers.append(made)
         return made
+
+    def put(self, topic: Topic, owner: str, encoded: bytes, attachment: bytes) -> None:
+        """Publish one encoded payload at once, whether or not a subscriber has been noticed."""
+        publisher = self._at_once.get((topic.noun, owner))
+        if publisher is None:
+            publisher = self._at_once[topic.noun, owner] = self.publisher(topic, owner)
+        publisher.put(encoded, attachment)
 
     def publish_batch(self, process: str, batch: bytes) -> None:
         """Send a batch of the record stream; blocks while the hub does not take it."""

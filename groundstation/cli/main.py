@@ -22,7 +22,7 @@ COMMANDS: dict[str, Row] = {
     "recording": Command("groundstation.cli.recording:app", "Look into recordings, recover a torn one."),
     "report": Command("groundstation.cli.report:app", "Draw the figures of a recording."),
     "request": Command(
-        "groundstation.cli.request:app", "Ask something of a running vehicle: arm, stop, go_to."
+        "groundstation.cli.request:app", "Ask something of a running vehicle, or stop all: arm, stop, go_to."
     ),
     "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),

@@ -7,8 +7,8 @@ PATTERN = "[a-z][a-z0-9_]*"
 LOOKS = "small letters, digits and underscores, beginning with a letter"
 
 RECORDER, LABORATORY, LAUNCHER = "recorder", "laboratory", "launcher"
-OF_THE_BUS = frozenset({"rig", "record", "alive"})
-"""First words of keys on the bus that stand for something else than a vehicle or a process."""
+OF_THE_BUS = frozenset({"rig", "record", "alive", "all"})
+"""First words of keys on the bus and of requests that stand for neither a vehicle nor a process."""
 OF_THE_LAUNCHER = frozenset({RECORDER, LABORATORY, LAUNCHER, "hub", "fork_server", "lockstep"})
 """Processes that run no nodes of a rig."""
 

@@ -29,6 +29,7 @@ from groundstation.launch.forking import share_one_arena
 from groundstation.launch.memory import forget, memory_folder
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
+from groundstation.launch.urgency import going_first
 from groundstation.rig.plan import processes_of
 from groundstation.rig.read import bytes_of
 
@@ -108,6 +109,12 @@ class Launcher:
     def waiting_for(self) -> list[str]:
         """Names of the processes that are not ready."""
         return [child.name for child in self.children if not child.is_ready]
+
+    @property
+    def recording_trouble(self) -> str:
+        """Why the recording could not be written to its end; known after ``close``, empty where it could."""
+        child = self._children.get(RECORDER)
+        return child.last_words if child is not None and child.code == process.TROUBLE else ""
 
     def received(self, name: str) -> None:
         """Note a sign of life of a process: a batch of its record stream."""
@@ -268,7 +275,8 @@ def _open_hub() -> tuple[str, ZenohBus]:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     try:
-        return endpoint, ZenohBus(endpoint, is_hub=True)
+        with going_first():  # its threads, which pass on everybody's messages
+            return endpoint, ZenohBus(endpoint, is_hub=True)
     except zenoh.ZError as error:  # somebody took the port in between
         raise GroundStationError(f"the hub cannot be opened at {endpoint}: {error}") from error
 

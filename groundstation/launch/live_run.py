@@ -16,6 +16,7 @@ from groundstation.launch.launcher import START_S, Launcher
 from groundstation.launch.running import RunningRig
 from groundstation.launch.running_time import RunningTime
 from groundstation.parts.operation.messages import Latency
+from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.monitor import Monitor
 
 LATENCY_PERIOD_S = 1.0
@@ -44,6 +45,7 @@ class LiveRun:
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
         self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
+        self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
         self._batches: Mailbox | None = None
         self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
@@ -114,6 +116,7 @@ class LiveRun:
             for entry in entries:
                 if not self._is_repeated(entry):
                     self.monitor.take(entry, now_ns)
+                    self.faults.take(entry)
 
     def _is_repeated(self, entry: Recorded) -> bool:
         """Whether it is a latched message that came before: publishers repeat them for late joiners."""

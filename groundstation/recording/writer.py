@@ -80,6 +80,16 @@ class Recorder:
             self.discard()  # nothing is in it that could be recovered
             raise
 
+    @property
+    def written_bytes(self) -> int:
+        """In the file so far; the open chunk is not."""
+        return 0 if self._file is None else self._file.tell()
+
+    @property
+    def rest_bytes(self) -> int:
+        """At most so many bytes are still to be written if the recording is finished now."""
+        return 0 if self._file is None else self._writer.rest_bytes
+
     def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
 

@@ -86,6 +86,10 @@ class Step:
         """Whether all who receive it here take it paced."""
         return all(pace is not None for _, pace in self._takers[address])
 
+    def writer_of(self, payload: Message) -> Port | None:
+        """The port that a message leaves through; None where it leaves through none."""
+        return self._writers.get((payload.TOPIC.noun, payload.vehicle))
+
     def start(self, now_ns: int) -> None:
         """Start every node."""
         for slot in self.slots:
@@ -128,11 +132,10 @@ class Step:
     def deliver(self, delivered: Delivered, now_ns: int) -> None:
         """Give a published message to the port that it leaves through and to the nodes that receive it."""
         payload = delivered.payload
-        address = payload.TOPIC.noun, payload.vehicle
-        port = self._writers.get(address)
+        port = self.writer_of(payload)
         if port is not None:
             self._transport.write(port, payload, now_ns)
-        self._give(address, delivered, now_ns)
+        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
 
     def receive(self, delivered: Delivered, now_ns: int) -> None:
         """Give a message of another process to the nodes that receive it."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-SILENT_S = 0.15
+SILENT_S = 0.3
 BAD_S = 0.1
 """So long in a row samples must be refused before it is a fault: one bad frame is noise."""
 JUMP_MS = 200

@@ -13,8 +13,10 @@ from groundstation.control.state import ControlState
 from groundstation.supervision.clearance import clearance
 
 NS_PER_S = 1_000_000_000
-STATE_S, NODE_S, FINDINGS_S, RECORDER_S, OTHER_S = 0.2, 0.3, 0.5, 2.0, 1.0
+STATE_S, NODE_S, FINDINGS_S, RECORDER_S, OTHER_S = 0.3, 0.5, 1.0, 2.0, 1.0
 """After so long without news, state, valve node, fault detector, recorder or another vehicle are silent."""
+FRESH_S = 0.1
+"""An older status says nothing about an order that was just given."""
 STARTING_S = 10.0
 """So long processes may take to start before their silence on the ground is a fault."""
 LATE_TICK_S = 0.1
@@ -245,7 +247,7 @@ class Sightings:
 
     def _obedience(self, now_ns: int, *, may_open: bool) -> Iterator[tuple[str, str]]:
         node = self.node
-        if node is not None and may_open and not self.is_node_silent(now_ns):
+        if node is not None and may_open and not self.is_silent(node.arrival_ns, FRESH_S, now_ns):
             if node.floating and not node.armed:
                 yield "node_disobeys", "it reports that it is disarmed"
             elif node.dead_man:

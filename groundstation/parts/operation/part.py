@@ -1,11 +1,23 @@
-"""Part ``operation``: how a rig is run: requests, recorder, health, calibrations in use, latency."""
+"""Part ``operation``: how a rig is run: requests, control lease, recorder, health, calibrations, latency."""
 
+from groundstation.declarations.lease import Lease
+from groundstation.declarations.node import STATION, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.request import Ack, Request
+from groundstation.declarations.rig import Rig
+from groundstation.parts.operation.lease_desk import ACTIONS, LeaseDesk
 from groundstation.parts.operation.messages import CalibrationInUse, Diagnostics, Latency, RecorderStatus
+
+
+def _lease_desk(rig: Rig, vehicle: str) -> Node:
+    del vehicle
+    return LeaseDesk(tuple(rig.vehicles))
+
 
 PART = Part(
     name="operation",
-    summary="requests and answers, recorder, health and latency",
-    topics=(Request, Ack, RecorderStatus, CalibrationInUse, Diagnostics, Latency),
+    summary="requests and answers, control lease, recorder, health and latency",
+    topics=(Request, Ack, Lease, RecorderStatus, CalibrationInUse, Diagnostics, Latency),
+    nodes=(NodeRow("lease_desk", STATION, Weight.LIGHT, LeaseDesk, _lease_desk, is_of_rig=True),),
+    actions=tuple(ACTIONS.values()),
 )

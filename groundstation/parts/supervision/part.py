@@ -12,6 +12,7 @@ from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.sections import StarsOfType
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
+from groundstation.parts.supervision.figures import SupervisionFigure
 from groundstation.parts.supervision.gauges import GAUGES
 from groundstation.parts.supervision.memory import MemoryPort
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
@@ -98,4 +99,5 @@ PART = Part(
     actions=tuple(ACTIONS.values()),
     vehicle=SupervisionOfVehicle,
     gauges=GAUGES,
+    figures=(SupervisionFigure,),
 )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from groundstation.control.state import ControlState
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -32,7 +33,7 @@ class SupervisorNode(Node):
     """
 
     inputs = (
-        StopPress, Request, Recalled, VehicleState, FusionStatus, ValveStatus, ValveDemand, Findings,
+        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveDemand, Findings,
         RecorderStatus,
     )  # fmt: skip
     paced = (VehicleState,)
@@ -51,6 +52,7 @@ class SupervisorNode(Node):
         self._others = others
         self._known = known
         self._absent = absent
+        self._lease = LeaseCheck()
         self._fixes = (0, 0)  # used and refused, when they were reported last
         self._published: Ruling | None = None
         self._published_ns = 0
@@ -71,8 +73,11 @@ class SupervisorNode(Node):
                 self._supervisor.press(message.author, message.press_id, now_ns)
                 yield from self._rule(now_ns)
             case Request() if self._answers(message.action):
-                yield answer(message, now_ns, self._carry_out(message, now_ns))
-                yield from self._rule(now_ns)
+                reason = self._carry_out(message, now_ns)
+                yield from self._rule(now_ns)  # first: what is answered has been kept
+                yield answer(message, now_ns, reason)
+            case Lease():
+                self._lease.take(message)
             case Recalled():
                 memory = memory_of(message)
                 if memory is not None:
@@ -130,6 +135,9 @@ class SupervisorNode(Node):
 
     def _carry_out(self, request: Request, now_ns: int) -> str:
         """Do what was asked; the reason if it cannot be done."""
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            return refusal
         if request.action in self._absent:
             return self._absent[request.action]
         if request.action not in ACTIONS:

@@ -8,6 +8,7 @@ from groundstation.control.mux import CommandMux, MuxConfig, Selection, Source
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -34,7 +35,7 @@ class CommandMuxNode(Node):
         modulators: Two, for braking and for pushing by hand, apart from that of the controller.
     """
 
-    inputs = (ValveDemand, VehicleState, Supervision, Request)
+    inputs = (ValveDemand, VehicleState, Supervision, Request, Lease)
     paced = (VehicleState,)
     outputs = (ValveSelection, Ack)
     trigger = ValveDemand
@@ -57,6 +58,7 @@ class CommandMuxNode(Node):
         self._brake_due_ns = 0
         self._ruling: Supervision | None = None
         self._ruling_ns = 0
+        self._lease = LeaseCheck()
         self._push: BodyWrench | None = None
         self._push_until_ns = self._push_due_ns = 0
         self._state: ControlState | None = None
@@ -82,7 +84,9 @@ class CommandMuxNode(Node):
                 self._choice.receive_state(now_ns)
             case Supervision():
                 yield from self._obey(message, now_ns)
-            case Request(action="resume"):
+            case Lease():
+                self._lease.take(message)
+            case Request(action="resume") if not self._lease.objection(message, now_ns):
                 self._push = None
             case Request() if message.action == PUSH.name:
                 yield answer(message, now_ns, self._begin_push(message, now_ns))
@@ -101,6 +105,9 @@ class CommandMuxNode(Node):
 
     def _begin_push(self, request: Request, now_ns: int) -> str:
         """Push by hand from now on; the reason if it cannot be done."""
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            return refusal
         try:
             given = PUSH.read(request)
         except ArgumentError as error:

@@ -72,7 +72,7 @@ class Run:
         self.folder = folder
         self._env = os.environ | {
             "XDG_RUNTIME_DIR": str(folder),
-            "XDG_STATE_HOME": str(folder),
+            "XDG_STATE_HOME": str(folder / "state"),
             "OPENBLAS_NUM_THREADS": "1",
         }
         command = [sys.executable, "-m", "groundstation", "run", str(rig), "--headless"]
@@ -146,7 +146,14 @@ class Run:
 
     def request(self, *words):
         """``groundstation request`` to this run."""
-        command = [sys.executable, "-m", "groundstation", "request", *words]
+        return self._call("request", *words)
+
+    def inject(self, *words):
+        """``groundstation inject`` into this run."""
+        return self._call("inject", *words)
+
+    def _call(self, *words):
+        command = [sys.executable, "-m", "groundstation", *words]
         return subprocess.run(command, env=self._env, capture_output=True, text=True, timeout=30, check=False)
 
 
