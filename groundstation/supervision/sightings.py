@@ -74,7 +74,7 @@ class NodeSeen:
     dead_man: bool
     pressure_pa: float
     faults: int
-    bus_rate_hz: float
+    bus_rate_hz: float = 0.0
 
 
 @dataclass(slots=True)
