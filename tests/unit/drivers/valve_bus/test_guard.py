@@ -158,6 +158,13 @@ def test_the_newest_pulse_of_one_tick_wins(flying):
     assert flying.guard.counters.new_pulses == 2
 
 
+def test_pulses_that_each_had_their_tick_superseded_nothing(flying):
+    for _ in range(3):
+        flying.say(ONE)
+        flying.tick()
+    assert flying.guard.counters.superseded_pulses == 0
+
+
 def test_commands_for_others_and_malformed_ones_are_refused(flying):
     guard = flying.guard
     before = guard.counters.commands

@@ -120,3 +120,8 @@ def test_unless_stated_demands_live_for_three_periods_and_states_for_two_seconds
 def test_a_freshness_that_is_none_is_refused(given):
     with pytest.raises(ValidationError, match=next(iter(given))):
         MuxConfig(**given)
+
+
+def test_what_was_configured_stays():
+    with pytest.raises(ValidationError, match="frozen"):
+        MuxConfig().state_s = 3.0

@@ -286,3 +286,7 @@ class TestFaults:
         found = Findings(0, "alpha", ("can_flooded",), ("",))
         kinds = [type(message) for message in node.tick(*node.well(floating=True, armed=True), found)]
         assert kinds == [Supervision, Faults]
+
+
+def test_its_period(node):
+    assert node.node.tick_period_ns == 20 * MS

@@ -219,3 +219,7 @@ def test_counters_are_reported_once_a_second(armed):
     counters = dict(zip(report.keys, report.values, strict=True))
     assert counters["commands"] == "2"
     assert counters["first_after_silence"] == "1"
+
+
+def test_its_period(guard):
+    assert guard.node.tick_period_ns == 20 * MS
