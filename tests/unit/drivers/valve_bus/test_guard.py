@@ -76,7 +76,7 @@ def test_disarming_closes_what_is_open(flying):
     after = flying.tick()
     assert after.open_mask == 0
     assert after.command.on_times_ms == CLOSED
-    assert after.command.pulse_id != before.command.pulse_id
+    assert after.command.pulse_id == (before.command.pulse_id + 1) % 16
     assert flying.guard.counters.stale_cuts == 0
 
 
@@ -107,7 +107,9 @@ def test_silence_of_100_ms_closes_all(flying):
 
 def test_one_command_after_silence_is_not_yet_a_source(flying):
     flying.tick(200)
+    before = flying.guard.counters.first_after_silence
     assert flying.say(ONE) is Verdict.FIRST_AFTER_SILENCE
+    assert flying.guard.counters.first_after_silence == before + 1
     assert flying.tick().gate is Gate.STALE
     assert flying.say() is Verdict.REFRESHED
     output = flying.tick()
@@ -163,6 +165,14 @@ def test_pulses_that_each_had_their_tick_superseded_nothing(flying):
         flying.say(ONE)
         flying.tick()
     assert flying.guard.counters.superseded_pulses == 0
+
+
+def test_pulse_ids_go_up_by_one_and_round_at_sixteen(flying):
+    ids = []
+    for _ in range(17):
+        flying.say(ONE)
+        ids.append(flying.tick().command.pulse_id)
+    assert ids == [(ids[0] + step) % 16 for step in range(17)]
 
 
 def test_commands_for_others_and_malformed_ones_are_refused(flying):

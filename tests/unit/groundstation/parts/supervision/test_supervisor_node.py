@@ -177,6 +177,8 @@ class TestWhatItSees:
         node.receive(ValveDemand(0, "alpha", bytes(8), (0.0, 0.0), 0.0))
         node.receive(Findings(0, "alpha", ("imu_stuck", "pushed"), ("a", "b")))
         assert node.known.demand_ns == 5
+        with pytest.raises(ValueError, match="zip"):
+            node.receive(Findings(0, "alpha", ("imu_stuck", "pushed"), ("a",)))
         assert (node.known.findings, node.known.findings_ns) == ({"imu_stuck": "a", "pushed": "b"}, 5)
 
 
