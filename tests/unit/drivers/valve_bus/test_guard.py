@@ -388,3 +388,42 @@ def test_a_valve_with_no_duty_never_opens(flying):
 def test_senseless_limits_are_refused(limits):
     with pytest.raises(ValueError, match=next(iter(limits))):
         OpenTimeLimits(**limits)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        lambda guard, ns: guard.arm(ns),
+        lambda guard, ns: guard.disarm(ns),
+        lambda guard, ns: guard.stop(ns, StopReason.OPERATOR),
+        lambda guard, ns: guard.announce_stop(ns, 1.0),
+        lambda guard, ns: guard.release_stop(ns),
+        lambda guard, ns: guard.update(ns, ValveCommand(1, 5, 5, ONE)),
+        lambda guard, ns: guard.tick(ns),
+    ],
+)
+def test_a_clock_that_goes_back_is_noticed_by_whatever_asks_first(order):
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    order(guard, 400 * MS)
+    assert guard.counters.clock_went_back == 1
+    assert not guard.is_armed
+
+
+def test_the_guards_own_time_stands_still_while_the_clock_goes_back():
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    assert guard._advance(400 * MS) == 1000 * MS
+    assert guard._advance(450 * MS) == 1050 * MS
+    assert guard._advance(350 * MS) == 1050 * MS
+
+
+def test_half_of_the_counters_values_ahead_is_new_and_more_is_old(flying):
+    assert flying.say(ONE, step=8) is Verdict.NEW_PULSE
+    assert flying.say(ONE, step=9) is Verdict.COUNTER_BACKWARDS
+
+
+def test_what_was_granted_whole_counts_as_clipped_by_nothing(flying):
+    flying.say(ONE)
+    flying.tick()
+    assert (flying.guard.counters.clipped_by_run, flying.guard.counters.clipped_by_duty) == (0, 0)
