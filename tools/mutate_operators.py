@@ -208,7 +208,8 @@ def _changes(node: ast.AST) -> Iterator[Change]:
         case ast.If() | ast.IfExp() | ast.While():
             yield _negated
         case ast.Return(value=ast.expr()) if not _is_plain(node.value):
-            yield lambda _: ast.Return(ast.Constant(None))
+            empty = isinstance(node.value, ast.Constant) and node.value.value == ""
+            yield _returned("changed" if empty else None)  # as good as "" would be None
         case ast.Expr(value=ast.Yield() | ast.YieldFrom() | ast.Call()):
             yield lambda _: ast.Pass()
         case ast.Continue():
@@ -255,6 +256,10 @@ def _joining(other: type[ast.boolop]) -> Change:
 
 def _constant(value: float) -> Change:
     return lambda _: ast.Constant(value)
+
+
+def _returned(value: str | None) -> Change:
+    return lambda _: ast.Return(ast.Constant(value))
 
 
 def _negated(node: ast.AST) -> ast.AST:

@@ -210,7 +210,7 @@ FAULTS: Mapping[str, Fault] = {
               ((0.0, _NOTE),), _ITSELF, True, True, "Free space on the disk."),
         Fault("leader_old", "What another vehicle of its formation publishes is old.",
               "no state of it for 1 s", 1.5,
-              ((0.0, _HOLD),), _ITSELF, False, True, "See what is wrong with the other vehicle."),
+              ((0.0, _HOLD),), _ITSELF, False, False, "See what is wrong with the other vehicle."),
     )
 }  # fmt: skip
 """THE TABLE, by id."""

@@ -95,7 +95,7 @@ def _faults() -> Shown:
         (
             fault.id,
             fault.what,
-            fault.found_by,
+            fault.found_by + (f", for {fault.confirm_s:g} s" if fault.confirm_s else ""),
             f"{fault.within_s:g} s",
             _steps(fault),
             fault.clears.value,

@@ -135,6 +135,7 @@ def test_a_fault_is_a_whole_row(fault):
     assert fault.found_by
     assert not fault.may_be_overridden or fault.steps[0][1] < Response.CUT
     assert fault.within_s >= fault.confirm_s >= 0.0
+    assert fault.blocks_arming or not fault.may_be_overridden
 
 
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=lambda fault: fault.id)

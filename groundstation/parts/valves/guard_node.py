@@ -78,10 +78,8 @@ class GuardNode(Node):
         if not ruling.stop_latched:
             if guard.stop_reason is not None or guard.is_stop_announced:
                 guard.release_stop(now_ns)
-        elif ruling.grace_s > 0.0:
-            guard.announce_stop(now_ns, ruling.grace_s)
-        elif guard.stop_reason is None:
-            guard.stop(now_ns, bus.StopReason.OPERATOR)
+        else:
+            guard.announce_stop(now_ns, ruling.grace_s)  # without grace: at once
         if ruling.may_open and not guard.is_armed:
             self._arm(now_ns)
         elif guard.is_armed and not ruling.may_open:

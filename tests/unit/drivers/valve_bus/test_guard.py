@@ -76,7 +76,7 @@ def test_disarming_closes_what_is_open(flying):
     after = flying.tick()
     assert after.open_mask == 0
     assert after.command.on_times_ms == CLOSED
-    assert after.command.pulse_id != before.command.pulse_id
+    assert after.command.pulse_id == (before.command.pulse_id + 1) % 16
     assert flying.guard.counters.stale_cuts == 0
 
 
@@ -107,7 +107,9 @@ def test_silence_of_100_ms_closes_all(flying):
 
 def test_one_command_after_silence_is_not_yet_a_source(flying):
     flying.tick(200)
+    before = flying.guard.counters.first_after_silence
     assert flying.say(ONE) is Verdict.FIRST_AFTER_SILENCE
+    assert flying.guard.counters.first_after_silence == before + 1
     assert flying.tick().gate is Gate.STALE
     assert flying.say() is Verdict.REFRESHED
     output = flying.tick()
@@ -156,6 +158,21 @@ def test_the_newest_pulse_of_one_tick_wins(flying):
     assert flying.tick().command.on_times_ms == (20,) * 8
     assert flying.guard.counters.superseded_pulses == 1
     assert flying.guard.counters.new_pulses == 2
+
+
+def test_pulses_that_each_had_their_tick_superseded_nothing(flying):
+    for _ in range(3):
+        flying.say(ONE)
+        flying.tick()
+    assert flying.guard.counters.superseded_pulses == 0
+
+
+def test_pulse_ids_go_up_by_one_and_round_at_sixteen(flying):
+    ids = []
+    for _ in range(17):
+        flying.say(ONE)
+        ids.append(flying.tick().command.pulse_id)
+    assert ids == [(ids[0] + step) % 16 for step in range(17)]
 
 
 def test_commands_for_others_and_malformed_ones_are_refused(flying):
@@ -371,3 +388,42 @@ def test_a_valve_with_no_duty_never_opens(flying):
 def test_senseless_limits_are_refused(limits):
     with pytest.raises(ValueError, match=next(iter(limits))):
         OpenTimeLimits(**limits)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        lambda guard, ns: guard.arm(ns),
+        lambda guard, ns: guard.disarm(ns),
+        lambda guard, ns: guard.stop(ns, StopReason.OPERATOR),
+        lambda guard, ns: guard.announce_stop(ns, 1.0),
+        lambda guard, ns: guard.release_stop(ns),
+        lambda guard, ns: guard.update(ns, ValveCommand(1, 5, 5, ONE)),
+        lambda guard, ns: guard.tick(ns),
+    ],
+)
+def test_a_clock_that_goes_back_is_noticed_by_whatever_asks_first(order):
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    order(guard, 400 * MS)
+    assert guard.counters.clock_went_back == 1
+    assert not guard.is_armed
+
+
+def test_the_guards_own_time_stands_still_while_the_clock_goes_back():
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    assert guard._advance(400 * MS) == 1000 * MS
+    assert guard._advance(450 * MS) == 1050 * MS
+    assert guard._advance(350 * MS) == 1050 * MS
+
+
+def test_half_of_the_counters_values_ahead_is_new_and_more_is_old(flying):
+    assert flying.say(ONE, step=8) is Verdict.NEW_PULSE
+    assert flying.say(ONE, step=9) is Verdict.COUNTER_BACKWARDS
+
+
+def test_what_was_granted_whole_counts_as_clipped_by_nothing(flying):
+    flying.say(ONE)
+    flying.tick()
+    assert (flying.guard.counters.clipped_by_run, flying.guard.counters.clipped_by_duty) == (0, 0)

@@ -39,10 +39,10 @@ def test_the_newest_demand_of_a_source_counts(mux):
 
 
 def test_silence_of_the_controller_brakes_for_closed_valves_mean_coasting(mux):
-    mux.control("hold", 0)
-    mux.receive_state(400 * MS)
-    assert mux.select(300 * MS).source is Source.CONTROLLER
-    chosen = mux.select(400 * MS)
+    mux.control("hold", 100 * MS)
+    mux.receive_state(500 * MS)
+    assert mux.select(400 * MS).source is Source.CONTROLLER
+    chosen = mux.select(500 * MS)
     assert chosen == Selection(Source.BRAKE, None, False, "controller silent for 400 ms")
 
 
@@ -120,3 +120,8 @@ def test_unless_stated_demands_live_for_three_periods_and_states_for_two_seconds
 def test_a_freshness_that_is_none_is_refused(given):
     with pytest.raises(ValidationError, match=next(iter(given))):
         MuxConfig(**given)
+
+
+def test_what_was_configured_stays():
+    with pytest.raises(ValidationError, match="frozen"):
+        MuxConfig().state_s = 3.0

@@ -116,6 +116,12 @@ class TestBrake:
         )
         assert math.hypot(*force) == pytest.approx(math.hypot(*whole.force_body_n))
 
+    def test_a_strong_direction_is_used_up_to_twice_the_weakest(self):
+        uneven = VehicleModel(10.0, 0.25, (*square_of_eight(0.15, 1.0)[:4], *square_of_eight()[4:]))
+        envelope = WrenchEnvelope(uneven)
+        wrench = brake_wrench(moving(speed_x=2.0), CONFIG, uneven, envelope)
+        assert wrench.force_body_n == pytest.approx((-2.0 * envelope.max_force_n, 0.0))
+
     def test_headings_of_many_turns_brake_alike(self):
         one = brake_wrench(moving(speed_x=0.005, heading_rad=1.0), CONFIG, VEHICLE, ENVELOPE)
         many = brake_wrench(moving(speed_x=0.005, heading_rad=1.0 + 20 * math.pi), CONFIG, VEHICLE, ENVELOPE)
@@ -152,16 +158,16 @@ class TestBrake:
 class TestDeadReckoning:
     def test_without_a_wrench_it_coasts(self):
         start = moving(0.1, 0.2, 0.03, -0.04, 0.5, 0.2)
-        end = dead_reckoned(start, BodyWrench((0.0, 0.0), 0.0), 2.0, VEHICLE)
-        assert end.position_table_m == pytest.approx((0.16, 0.12))
+        end = dead_reckoned(start, BodyWrench((0.0, 0.0), 0.0), 3.0, VEHICLE)
+        assert end.position_table_m == pytest.approx((0.19, 0.08))
         assert end.velocity_table_m_s == (0.03, -0.04)
-        assert (end.heading_rad, end.rate_rad_s) == (pytest.approx(0.9), 0.2)
+        assert (end.heading_rad, end.rate_rad_s) == (pytest.approx(1.1), 0.2)
 
     def test_a_force_and_a_torque_act_along_the_middle_heading(self):
-        # heading 0.5 + 0.5 * 0.2 * 2 = 0.7 rad; 2 N on 10 kg: 0.2 m/s2 for 2 s
-        end = dead_reckoned(moving(1.0, 2.0, 0.1, 0.3, 0.5, 0.2), BodyWrench((2.0, 0.0), 0.025), 2.0, VEHICLE)
-        ax, ay = 0.2 * math.cos(0.7), 0.2 * math.sin(0.7)
-        assert end.velocity_table_m_s == pytest.approx((0.1 + 2.0 * ax, 0.3 + 2.0 * ay))
-        assert end.position_table_m == pytest.approx((1.0 + 0.2 + 2.0 * ax, 2.0 + 0.6 + 2.0 * ay))
-        assert end.rate_rad_s == pytest.approx(0.2 + 0.1 * 2.0)
-        assert end.heading_rad == pytest.approx(0.5 + 0.4 + 0.5 * 0.1 * 4.0)
+        # heading 0.5 + 0.5 * 0.2 * 3 = 0.8 rad; 2 N on 10 kg: 0.2 m/s2 for 3 s
+        end = dead_reckoned(moving(1.0, 2.0, 0.1, 0.3, 0.5, 0.2), BodyWrench((2.0, 0.0), 0.025), 3.0, VEHICLE)
+        ax, ay = 0.2 * math.cos(0.8), 0.2 * math.sin(0.8)
+        assert end.velocity_table_m_s == pytest.approx((0.1 + 3.0 * ax, 0.3 + 3.0 * ay))
+        assert end.position_table_m == pytest.approx((1.0 + 0.3 + 4.5 * ax, 2.0 + 0.9 + 4.5 * ay))
+        assert end.rate_rad_s == pytest.approx(0.2 + 0.1 * 3.0)
+        assert end.heading_rad == pytest.approx(0.5 + 0.6 + 0.5 * 0.1 * 9.0)

@@ -149,6 +149,15 @@ def test_several_faults_end_each_in_its_own_time(board):
     board.look(0, {"hold": "", "latched": "", "note": ""})
     assert board.look(CLEAR_NS, {"note": ""})
     assert ids(board) == ["latched", "note"]
+    board.look(2 * CLEAR_NS, {"note": "", "hold": ""})
+    board.look(3 * CLEAR_NS, {"note": ""})
+    assert ids(board) == ["latched", "note"]
+
+
+def test_a_fault_ends_behind_one_that_goes_on(board):
+    board.look(0, {"note": "", "hold": ""})
+    board.look(CLEAR_NS, {"note": ""})
+    assert ids(board) == ["note"]
 
 
 def test_a_person_clears_what_is_gone_and_nothing_else(board):

@@ -137,6 +137,13 @@ class TestFixes:
             watch.take_account(count * MS, is_used=count % 7 == 6, reason="5 sigma")
         assert self.found(watch, 100) == {}
 
+    def test_after_a_used_fix_the_row_begins_at_one(self, watch):
+        self.use(watch, 0)
+        for count in range(REFUSED_IN_A_ROW):
+            assert self.found(watch, 10) == {}
+            watch.take_account(count, is_used=False, reason="x")
+        assert "wrong_fixes" in self.found(watch, 10)
+
     def test_what_was_found_lasts_a_second(self, watch):
         watch.take_picture(0, "torn picture")
         assert self.found(watch, 999) == {"camera_torn": "torn picture"}

@@ -85,6 +85,7 @@ class TestPort:
         again.wake()
         assert tuple(again.read()) == ()
         first.close()
+        assert first._file._ending.is_set()  # who still reads returns
         assert tuple(first.read()) == ()
 
 

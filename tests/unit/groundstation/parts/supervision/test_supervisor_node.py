@@ -177,6 +177,8 @@ class TestWhatItSees:
         node.receive(ValveDemand(0, "alpha", bytes(8), (0.0, 0.0), 0.0))
         node.receive(Findings(0, "alpha", ("imu_stuck", "pushed"), ("a", "b")))
         assert node.known.demand_ns == 5
+        with pytest.raises(ValueError, match="zip"):
+            node.receive(Findings(0, "alpha", ("imu_stuck", "pushed"), ("a",)))
         assert (node.known.findings, node.known.findings_ns) == ({"imu_stuck": "a", "pushed": "b"}, 5)
 
 
@@ -286,3 +288,7 @@ class TestFaults:
         found = Findings(0, "alpha", ("can_flooded",), ("",))
         kinds = [type(message) for message in node.tick(*node.well(floating=True, armed=True), found)]
         assert kinds == [Supervision, Faults]
+
+
+def test_its_period(node):
+    assert node.node.tick_period_ns == 20 * MS

@@ -337,3 +337,7 @@ class TestPush:
     def test_other_requests_are_not_its_business(self, flying):
         assert list(flying.receive(request("stop"), 0)) == []
         assert list(flying.receive(request("arm"), 0)) == []
+
+
+def test_its_period(mux):
+    assert mux.tick_period_ns == 20 * MS

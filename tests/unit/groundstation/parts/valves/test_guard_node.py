@@ -185,6 +185,13 @@ class TestOrderThatWasMissed:
             orders.append(armed.tick(20).arm)
         assert orders == [0, 0, 0, 0, 0, 2] + [0, 0, 0, 0, 2] * 2
 
+    @pytest.mark.parametrize(("later_ms", "order"), [(99, 0), (100, 2)])
+    def test_it_is_given_a_tenth_of_a_second(self, armed, later_ms, order):
+        armed.tick()
+        armed.now_ms += later_ms
+        armed.report(armed=False)
+        assert armed.tick().arm == order
+
     def test_a_node_that_is_armed_is_left_alone(self, armed):
         armed.tick()
         armed.now_ms += 200
@@ -219,3 +226,7 @@ def test_counters_are_reported_once_a_second(armed):
     counters = dict(zip(report.keys, report.values, strict=True))
     assert counters["commands"] == "2"
     assert counters["first_after_silence"] == "1"
+
+
+def test_its_period(guard):
+    assert guard.node.tick_period_ns == 20 * MS

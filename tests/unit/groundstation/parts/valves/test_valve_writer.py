@@ -147,3 +147,7 @@ class TestButton:
 
     def test_the_very_first_frame_counts_even_at_the_beginning_of_time(self, writer):
         assert len(arrive(writer, bus.Stop(INDEX), 0)) == 1
+
+
+def test_its_period(writer):
+    assert writer.tick_period_ns == 100 * MS
