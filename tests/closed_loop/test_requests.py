@@ -26,6 +26,7 @@ FIRST = {
     "float_on": ["land"],
     "arm": ["land"],
     "resume": ["brake"],
+    "give_control": ["take_control"],
 }
 """What has to be asked for before an action counts."""
 

@@ -11,6 +11,7 @@ from groundstation.bus.record_stream import RecordWriter, read_batch
 from groundstation.launch.recorder import SPARE_BYTES, live_on, write_until_end
 from groundstation.launch.recorder_reporter import RATE_WINDOW_NS, RecorderReporter
 from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
@@ -91,7 +92,7 @@ def test_on_a_disk_that_fills_it_ends_in_time_and_the_file_is_whole(tmp_path):
             reporter._due_ns = 0
             write_until_end(recorder, waiting, Bus(), "recorder", {"latency": Latency}, reporter)
 
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(RecordingError, match="the disk is full"):
         fill()
     recorder.finish()
     assert (tmp_path / "run.mcap").stat().st_size < disk

@@ -43,13 +43,13 @@ def test_each_heartbeat_is_asked_for(known, silent, name):
     assert f"heartbeats: nothing comes from {name}" in against(known, override="test")
 
 
-@pytest.mark.parametrize(("age_ms", "is_old"), [(200, False), (201, True)])
+@pytest.mark.parametrize(("age_ms", "is_old"), [(300, False), (301, True)])
 def test_a_state_must_be_fresh(known, seen, age_ms, is_old):
     known.own = seen(NOW_NS - age_ms * 1_000_000)
     assert against(known) == (("heartbeats: nothing comes from fusion",) if is_old else ())
 
 
-@pytest.mark.parametrize(("age_ms", "is_old"), [(300, False), (301, True)])
+@pytest.mark.parametrize(("age_ms", "is_old"), [(500, False), (501, True)])
 def test_a_status_of_the_node_must_be_fresh(known, node, age_ms, is_old):
     known.node = node(NOW_NS - age_ms * 1_000_000)
     assert against(known) == (("heartbeats: nothing comes from valve node",) if is_old else ())
@@ -111,7 +111,7 @@ def test_lesser_faults_can_be_overridden(known):
 
 
 def test_faults_that_only_count_in_flight_keep_nothing_down(known):
-    assert against(known, "edge_unavoidable", "leader_old", "node_disobeys") == ()
+    assert against(known, "edge_unavoidable", "leader_old") == ()
 
 
 def test_checks_have_names_of_their_own_and_say_what_must_hold():

@@ -30,7 +30,8 @@ def test_every_row_of_every_table_is_shown():
 def test_a_fault_is_shown_in_words():
     rows = {row[0]: row for row in tables()[3].rows}
     assert rows["state_silent"][3:7] == (
-        "0.3 s", "brakes, then lands; cuts the float air after 1.5 s", "by itself", "yes",
+        "0.5 s", "brakes and holds; brakes, then lands after 0.5 s; cuts the float air after 1.5 s",
+        "by itself", "yes",
     )  # fmt: skip
     assert rows["tank_low"][6] == "unless overridden"
     assert rows["leader_old"][6] == "no"

@@ -34,9 +34,9 @@ class TestSilence:
     @pytest.mark.parametrize(
         ("fault", "limit_ms", "detail"),
         [
-            ("state_silent", 200, "the newest state is 0.2 s old"),
-            ("can_silent", 300, "the newest status is 0.3 s old"),
-            ("detector_silent", 500, "the newest findings is 0.5 s old"),
+            ("state_silent", 300, "the newest state is 0.3 s old"),
+            ("can_silent", 500, "the newest status is 0.5 s old"),
+            ("detector_silent", 1000, "the newest findings is 1.0 s old"),
             ("controller_silent", 500, "the newest demand is 0.5 s old"),
         ],
     )
@@ -57,10 +57,10 @@ class TestSilence:
 
     def test_before_the_first_arrival_silence_counts_from_the_beginning(self, sightings):
         known = sightings(began_ns=5 * S)
-        assert found(known, 5 * S + 200 * MS) == {}
-        assert found(known, 5 * S + 200 * MS + 1) == {"state_silent": "no state was ever received"}
-        assert found(known, 5 * S + 300 * MS + 1)["can_silent"] == "no status was ever received"
-        assert found(known, 5 * S + 501 * MS)["detector_silent"] == "no findings was ever received"
+        assert found(known, 5 * S + 300 * MS) == {}
+        assert found(known, 5 * S + 300 * MS + 1) == {"state_silent": "no state was ever received"}
+        assert found(known, 5 * S + 500 * MS + 1)["can_silent"] == "no status was ever received"
+        assert found(known, 6 * S + 1)["detector_silent"] == "no findings was ever received"
 
     def test_on_the_ground_processes_may_take_ten_seconds_to_start(self, sightings):
         known = sightings(began_ns=5 * S)

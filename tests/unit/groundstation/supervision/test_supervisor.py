@@ -269,7 +269,7 @@ class TestFaults:
 
     def test_a_state_that_is_silent_is_not_at_rest(self, flying):
         flying.silent.add("state")
-        flying.run(0.3)
+        flying.run(0.4)
         assert flying.mode is Mode.BRAKING
         assert flying.run(0.5) == ["braking"]
 
@@ -354,12 +354,12 @@ class TestStop:
         assert flying.ruling.memory.cause == f"braking does not help: the air is cut: {cause}"
 
     def test_a_stop_without_a_state_cuts_the_air_at_once(self, flying):
-        flying.now_ns += 250_000_000
+        flying.now_ns += 350_000_000
         assert flying.press(1)
         assert flying.ruling.memory.cause == "braking does not help: the air is cut: state_silent"
 
     def test_a_stop_without_a_node_cuts_the_air_at_once(self, flying, seen):
-        flying.now_ns += 350_000_000
+        flying.now_ns += 550_000_000
         flying.sightings.own = seen(flying.now_ns)
         assert flying.press(1)
         assert flying.ruling.memory.cause == "braking does not help: the air is cut: can_silent"

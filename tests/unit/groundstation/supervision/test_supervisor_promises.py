@@ -125,7 +125,7 @@ class SupervisedVehicle(RuleBasedStateMachine):
         if counted and self.pressed_ns is None:
             self.pressed_ns = self.now_ns
         elif counted:
-            assert self.now_ns - self.pressed_ns >= NEW_PRESS_S * S or mode in GROUNDED
+            assert self.now_ns - self.pressed_ns >= NEW_PRESS_S * S or mode in (*GROUNDED, Mode.LANDING)
             assert GUARANTEES[self.supervisor.mode].air is Air.OFF
         if counted:
             self.wanted = self.asked_for_air = False

@@ -38,7 +38,7 @@ class Driven:
         return list(self.node.receive(ruling, self.now_ms * MS))
 
     def report(self, *, armed):
-        status = ValveStatus(0, "alpha", 0, 0, armed, False, True, math.nan, 0)
+        status = ValveStatus(0, "alpha", 0, 0, armed, False, True, math.nan, 0, 60.0)
         return list(self.node.receive(status, self.now_ms * MS))
 
     def tick(self, later_ms=0):
