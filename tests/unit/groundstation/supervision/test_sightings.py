@@ -190,7 +190,7 @@ class TestMotion:
             (0.446, {}),
             (0.444, {"vehicle_ahead": "beta: 29 mm would be left"}),
             (0.416, {"vehicle_ahead": "beta: 1 mm would be left"}),
-            (0.413, {"vehicle_unavoidable": "beta: they would overlap by 2 mm"}),
+            (0.405, {"vehicle_unavoidable": "beta: they would overlap by 10 mm"}),
         ],
     )
     def test_another_vehicle_is_seen_in_time(self, known, seen, apart_m, expected):

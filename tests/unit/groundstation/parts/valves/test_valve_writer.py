@@ -151,3 +151,7 @@ class TestButton:
 
 def test_its_period(writer):
     assert writer.tick_period_ns == 100 * MS
+
+
+def test_what_is_none_of_its_inputs_is_left_alone(writer):
+    assert list(writer.receive(StopPress(0, "alpha", 1, "anna"), 0)) == []
