@@ -111,7 +111,7 @@ FAULTS: Mapping[str, Fault] = {
               "Look at the camera's cable and driver.", ("torn_camera",)),
         Fault("fixes_rare", "Fixes come much less often than they did.",
               "their number within a second", 2.0,
-              ((0.0, _NOTE),), _ITSELF, False, True,
+              ((0.0, _NOTE),), _ITSELF, False, False,
               "Look at the load of the machine and at the camera.", ("slow_camera",)),
         Fault("wrong_fixes", "Fixes contradict the IMU and each other.",
               "a burst of refused fixes", 1.0,
