@@ -4,7 +4,7 @@ STAMP := .venv/.installed
 CORE := .venv/.core
 PEERS := .venv/.peers
 
-.PHONY: run test test-all check bench clean zig
+.PHONY: run test test-all check bench mutate clean zig
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test-all  the slow tests too"
 	@echo "make check     format, lint, types, import contracts"
 	@echo "make bench     measure what docs/benchmarks.md reports"
+	@echo "make mutate    change the safety path 200 times; a test must notice each change"
 
 $(STAMP): pyproject.toml tools/requirements.lock
 	@echo "Creating .venv (once) ..."
@@ -54,6 +55,9 @@ $(PEERS): tools/requirements-bench.lock | $(STAMP)
 
 bench: $(CORE) $(PEERS)
 	@$(BIN)/python tools/bench.py
+
+mutate: $(CORE)
+	@$(BIN)/python tools/mutate.py --sample 200 --seed 1 --write docs/benchmarks.md
 
 clean:
 	@rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

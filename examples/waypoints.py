@@ -12,7 +12,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.declarations.rig import Rig
 from groundstation.parts.control.messages import ControlStatus
-from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.recording.writer import Recorder
 from groundstation.rig.provenance import recording_info
 from groundstation.rig.read import load_rig, read_text
@@ -34,7 +34,7 @@ class Waypoints(Node):
         near_rad: ... and this turn.
     """
 
-    inputs = (SequencePhase, ControlStatus)
+    inputs = (Supervision, ControlStatus)
     outputs = (Request,)
 
     def __init__(
@@ -50,8 +50,8 @@ class Waypoints(Node):
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
-            case SequencePhase():
-                self._is_flying = message.phase == "flying"
+            case Supervision():
+                self._is_flying = message.mode == "flying"
             case ControlStatus() if self._is_flying and self._is_reached(message):
                 x_m, y_m, heading_rad = self._goal = next(self._poses)
                 self._requests += 1

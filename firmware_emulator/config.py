@@ -8,10 +8,11 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AliasChoices, Field, model_validator
+from pydantic import AliasChoices, Field, ValidationInfo, model_validator
 
 from drivers.valve_bus.protocol import MAX_VEHICLES
-from firmware_emulator.failures import FailureConfig
+from firmware_emulator.applicability import why_not
+from firmware_emulator.failures import FAILURE_KINDS, FailureConfig
 from firmware_emulator.mock_up_config import VehicleConfig
 from firmware_emulator.settings import Fraction, NonNegative, Pair, Positive, Settings
 
@@ -76,6 +77,16 @@ class LaboratoryConfig(Settings):
                 raise ValueError(
                     f"failure {failure.kind!r} names vehicle {failure.vehicle!r}; there are {names}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _failures_find_what_they_befall(self, info: ValidationInfo) -> "LaboratoryConfig":
+        kinds = (info.context or {}).get("failure_kinds", FAILURE_KINDS)
+        by_name = {vehicle.name: vehicle for vehicle in self.vehicles}
+        for failure in self.failures:
+            reason = why_not(failure.kind, kinds[failure.kind], by_name[failure.vehicle], self)
+            if reason:
+                raise ValueError(f"failure {failure.kind!r} of {failure.vehicle!r} cannot happen: {reason}")
         return self
 
     @model_validator(mode="after")

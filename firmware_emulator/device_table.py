@@ -16,11 +16,12 @@ from drivers.errors import NotFound
 from drivers.valve_bus.protocol import MAX_VEHICLES
 from firmware_emulator.config import LaboratoryConfig
 from firmware_emulator.device_kind import DeviceKind
+from firmware_emulator.devices.drawn_fixes import FIXES
 from firmware_emulator.devices.failure_channel import LABORATORY
 from firmware_emulator.devices.imu import IMU
 from firmware_emulator.devices.overhead_camera import OVERHEAD_CAMERA
-from firmware_emulator.devices.pose_streams import FIXES, REFERENCE
 from firmware_emulator.devices.star_camera import STAR_CAMERA
+from firmware_emulator.devices.truth_stream import REFERENCE
 from firmware_emulator.devices.valve_bus import VALVE_BUS
 from firmware_emulator.failures import FAILURE_KINDS, FailureKind
 from firmware_emulator.mock_up_config import VehicleConfig

@@ -26,6 +26,7 @@ class Installed:
         kind: Its row of the table.
         channel: Where what it sends arrives.
         device: The thing itself.
+        receiver: The thing again if something can be sent into its channel.
         settings: What it was built from.
         order: Who draws its pictures, if it is a camera.
         renderer: Draws them here; None if nobody does, or somebody else.
@@ -34,6 +35,7 @@ class Installed:
     kind: DeviceKind[Any]
     channel: str
     device: Device
+    receiver: Receiver | None
     settings: Any
     order: PictureOrder | None
     renderer: Renderer | None
@@ -58,6 +60,7 @@ class EmulatedLaboratory:
         pydantic.ValidationError: The table is not a scenario.
         SceneError: A star list or camera file of a rendered camera cannot be read.
         NotFound: A device of an installed package cannot be loaded.
+        TypeError: Something can be sent to a kind of device that has no method `receive`.
     """
 
     def __init__(
@@ -74,7 +77,7 @@ class EmulatedLaboratory:
         self.mock_ups: tuple[MockUp, ...] = build_mock_ups(scenario, self.surface, floor)
         site = Site(scenario, self.mock_ups, failure_kinds(device_kinds()))
         self.installed = tuple(_install(site, is_rendering))
-        self._by_channel = {row.channel: row for row in self.installed}
+        self._places = {row.channel: place for place, row in enumerate(self.installed)}
         self._now_ns = start_ns
         table = scenario.config.table
         contacts = ContactWatch(
@@ -82,7 +85,9 @@ class EmulatedLaboratory:
             Contacts(table.bounds_m, table.edge_restitution, table.contact_restitution),
         )
         self._runners: tuple[Runner, ...] = (contacts, *(row.device for row in self.installed))
+        # Kept, and looked up again of a device that did something: asking all of them each time costs more.
         self._due_ns = [runner.next_ns for runner in self._runners]
+        self._output_ns = [row.device.next_output_ns for row in self.installed]
 
     def channels(self) -> Mapping[str, ChannelKind]:
         """Every channel, by the devices that the scenario has."""
@@ -90,19 +95,23 @@ class EmulatedLaboratory:
 
     def next_arrival_ns(self) -> int | None:
         """Earliest stamp at which something may reach the host if nothing is sent in."""
-        return max(self._now_ns, min(row.device.next_output_ns for row in self.installed))
+        return max(self._now_ns, min(self._output_ns))
 
     def advance(self, stamp_ns: int) -> Sequence[Arrival]:
         """Run up to `stamp_ns` and hand over all that reached the host since, that stamp included."""
-        due_ns = self._due_ns
+        due_ns, output_ns = self._due_ns, self._output_ns
         while (now_ns := min(due_ns)) <= stamp_ns:
             row = due_ns.index(now_ns)
             self._runners[row].run(now_ns)
             due_ns[row] = self._runners[row].next_ns
+            if row:  # contacts send nothing
+                output_ns[row - 1] = self.installed[row - 1].device.next_output_ns
         self._now_ns = max(self._now_ns, stamp_ns)
         arrivals: list[Arrival] = []
-        for installed in self.installed:
-            _collect(installed, stamp_ns, arrivals)
+        for place, may_arrive_ns in enumerate(output_ns):
+            if may_arrive_ns <= stamp_ns:
+                _collect(self.installed[place], stamp_ns, arrivals)
+                output_ns[place] = self.installed[place].device.next_output_ns
         arrivals.sort(key=_stamp)  # stable: equal stamps keep the order of devices
         return arrivals
 
@@ -114,23 +123,26 @@ class EmulatedLaboratory:
         """
         if stamp_ns < self._now_ns:
             raise ValueError(f"cannot deliver at {stamp_ns} ns: the laboratory is at {self._now_ns} ns")
-        row = self._by_channel.get(channel)
-        accepts = None if row is None else row.kind.accepts
-        if row is None or accepts is None or not isinstance(data, accepts):
+        place = self._places.get(channel)
+        row = None if place is None else self.installed[place]
+        if (
+            place is None
+            or row is None
+            or row.receiver is None
+            or not isinstance(data, row.kind.accepts or ())
+        ):
             raise ValueError(f"nothing of type {type(data).__name__} can be sent into channel {channel!r}")
-        if not isinstance(row.device, Receiver):
-            raise TypeError(f"device kind {row.kind.name!r} accepts data but has no method receive")
-        row.device.receive(stamp_ns, data)
-        self._due_ns[1 + self.installed.index(row)] = row.device.next_ns
+        row.receiver.receive(stamp_ns, data)
+        self._due_ns[1 + place], self._output_ns[place] = row.device.next_ns, row.device.next_output_ns
 
     def take_exposures(self) -> list[tuple[str, Any]]:
         """With `is_rendering` False: exposures to be drawn, each with the name of its camera."""
-        return [
-            (row.order.name, exposure)
-            for row in self.installed
-            if row.order and isinstance(row.device, Camera)
-            for exposure in row.device.take_exposed()
-        ]
+        exposures: list[tuple[str, Any]] = []
+        for place, row in enumerate(self.installed):
+            if row.order and isinstance(row.device, Camera):
+                exposures += [(row.order.name, exposure) for exposure in row.device.take_exposed()]
+                self._output_ns[place] = row.device.next_output_ns
+        return exposures
 
     def close(self) -> None:
         """Nothing to release: everything is in memory."""
@@ -151,7 +163,15 @@ def _install(site: Site, is_rendering: bool) -> Iterator[Installed]:
             channel = f"{mock_up.name}/{kind.name}" if mock_up else kind.name
             order = kind.order(scenario, index)
             renderer = order.load() if order and is_rendering else None
-            yield Installed(kind, channel, device, settings, order, renderer)
+            yield Installed(kind, channel, device, _receiver(kind, device), settings, order, renderer)
+
+
+def _receiver(kind: DeviceKind[Any], device: Device) -> Receiver | None:
+    if kind.accepts is None:
+        return None
+    if not isinstance(device, Receiver):
+        raise TypeError(f"device kind {kind.name!r} accepts data but has no method receive")
+    return device
 
 
 def _collect(row: Installed, until_ns: int, arrivals: list[Arrival]) -> None:

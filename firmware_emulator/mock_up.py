@@ -52,7 +52,18 @@ def _build_mock_up(scenario: Scenario, index: int, surface: Surface, floor: Floo
         scenario.start_ns,
     )
     failures = Failures.of_vehicle(scenario.config.failures, config.name)
+    failures.watch("body", lambda now_ns: _push(vehicle, failures, now_ns, scenario.start_ns))
     return MockUp(index, config, vehicle, grid, failures, scenario)
+
+
+def _push(vehicle: Vehicle, failures: Failures, now_ns: int, start_ns: int) -> None:
+    """Let all hands push that do so at `now_ns`."""
+    hands = failures.all_active("pushed", now_ns - start_ns)
+    force_x_n, force_y_n, torque_nm = (
+        sum(hand.parameters[name] for hand in hands) for name in ("force_x_n", "force_y_n", "torque_nm")
+    )
+    vehicle.advance(now_ns)
+    vehicle.set_hand(force_x_n, force_y_n, torque_nm)
 
 
 def _build_vehicle(

@@ -23,7 +23,17 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy loads: figures are per core
 
 import cv2  # noqa: E402
-from bench import fresh_clone, house, live, lockstep_speed, many_mock_ups, overhead, parser, station_keeping  # noqa: E402
+from bench import (  # noqa: E402
+    fresh_clone,
+    house,
+    live,
+    lockstep_speed,
+    many_mock_ups,
+    overhead,
+    parser,
+    station_keeping,
+    stop,
+)
 from bench import table as bench_table  # noqa: E402
 from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
 from bench.fusion import folder as fusion_folder  # noqa: E402
@@ -41,6 +51,7 @@ from rich.console import Console  # noqa: E402
 MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
+        "stop": stop.measure,
         "house": house.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,

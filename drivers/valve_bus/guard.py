@@ -10,6 +10,7 @@ from dataclasses import replace
 from drivers.valve_bus.guard_account import Gate, GuardCounters, GuardOutput, Verdict
 from drivers.valve_bus.messages import (
     COUNTER_MODULUS,
+    MAX_GRACE_S,
     MAX_ON_TIME_MS,
     SILENCE_CLOSES_S,
     VALVES,
@@ -23,7 +24,8 @@ from drivers.valve_bus.valve_budget import Clip, OpenTimeLimits, ValveBudget
 
 __all__ = ["Gate", "Guard", "GuardCounters", "GuardOutput", "OpenTimeLimits", "Verdict"]
 
-_SILENCE_NS = round(SILENCE_CLOSES_S * 1e9)
+_NS_PER_S = 1_000_000_000
+_SILENCE_NS = round(SILENCE_CLOSES_S * _NS_PER_S)
 
 
 class Guard:
@@ -35,6 +37,7 @@ class Guard:
         self._budgets = [ValveBudget(limits) for _ in range(VALVES)]
         self._is_armed = False
         self._stop_reason: StopReason | None = None
+        self._stops_ns: int | None = None  # when the grace of an announced stop is over, guard's own time
         self._last_stamp_ns: int | None = None
         self._offset_ns = 0  # from stamps to the guard's own time, which never goes back
         self._received_ns: int | None = None  # last command in sequence, the first after silence included
@@ -57,14 +60,22 @@ class Guard:
         return self._stop_reason
 
     @property
+    def is_stop_announced(self) -> bool:
+        """Commands still pass, but a stop follows when its grace is over."""
+        return self._stops_ns is not None
+
+    @property
     def counters(self) -> GuardCounters:
         """A copy of the counters."""
         return replace(self._counters)
 
     def arm(self, stamp_ns: int) -> bool:
-        """Let valves open from the next new pulse on; False (and no change) while a stop is latched."""
+        """Let valves open from the next new pulse on; False (and no change) while a stop holds.
+
+        A node refuses to be armed while a stop is latched or announced, so the guard does.
+        """
         self._advance(stamp_ns)
-        if self._stop_reason is not None:
+        if self._stop_reason is not None or self._stops_ns is not None:
             return False
         self._is_armed = True
         self._pending = None  # asked for before anybody reported that valves may open
@@ -82,9 +93,36 @@ class Guard:
         self._advance(stamp_ns)
         self._latch_stop(reason)
 
+    def announce_stop(self, stamp_ns: int, grace_s: float) -> None:
+        """Let commands pass for `grace_s` more, for braking, then stop as `stop` does.
+
+        Every tick meanwhile begins with the stop frame and the grace that is left, so that the node stops in
+        time whatever becomes of the station. A later announcement may shorten the grace, never lengthen it.
+
+        Args:
+            stamp_ns: Now.
+            grace_s: At most 25.5 s, more is taken for that. Not above 0 (or no number): stop at once, since a
+                stop is never refused.
+        """
+        now_ns = self._advance(stamp_ns)
+        if self._stop_reason is not None:
+            return
+        if not grace_s > 0.0:
+            self._latch_stop(StopReason.OPERATOR)
+            return
+        stops_ns = now_ns + round(min(grace_s, MAX_GRACE_S) * _NS_PER_S)
+        self._stops_ns = stops_ns if self._stops_ns is None else min(self._stops_ns, stops_ns)
+
     def release_stop(self, stamp_ns: int) -> None:
-        """Forget a latched stop; the guard stays disarmed."""
+        """Forget a stop, latched or announced; the guard is disarmed.
+
+        A node cannot be told to forget an announced stop: it lands when the grace is over.
+        """
         self._advance(stamp_ns)
+        if self._stops_ns is not None:
+            self._stops_ns = None
+            self._is_armed = False
+            self._announcement = Arm(self.vehicle, is_armed=False)
         self._stop_reason = None
 
     def update(self, stamp_ns: int, command: ValveCommand) -> Verdict:
@@ -126,6 +164,8 @@ class Guard:
         messages: list[ValveBusMessage] = []
         if self._stop_reason is not None:
             messages.append(Stop(self.vehicle, self._stop_reason))
+        elif self._stops_ns is not None:
+            messages.append(Stop(self.vehicle, StopReason.OPERATOR, (self._stops_ns - now_ns) / _NS_PER_S))
         if self._announcement is not None:
             messages.append(self._announcement)
             self._announcement = None
@@ -134,14 +174,20 @@ class Guard:
         return GuardOutput(tuple(messages), command, gate, open_mask)
 
     def _advance(self, stamp_ns: int) -> int:
-        """The guard's own time. A clock that goes back would make old commands look fresh: stop."""
+        """The guard's own time. A clock that goes back would make old commands look fresh: stop.
+
+        An announced stop whose grace is over becomes a latched one.
+        """
         if self._last_stamp_ns is not None and stamp_ns < self._last_stamp_ns:
             self._counters.clock_went_back += 1
             self._offset_ns += self._last_stamp_ns - stamp_ns
             self._received_ns = None
             self._latch_stop(StopReason.GUARD)
         self._last_stamp_ns = stamp_ns
-        return stamp_ns + self._offset_ns
+        now_ns = stamp_ns + self._offset_ns
+        if self._stops_ns is not None and now_ns >= self._stops_ns:
+            self._latch_stop(StopReason.OPERATOR)
+        return now_ns
 
     def _judge(self, now_ns: int, command: ValveCommand) -> Verdict:
         if command.vehicle != self.vehicle:
@@ -181,6 +227,7 @@ class Guard:
             self._counters.stops += 1
             self._stop_reason = reason
         self._is_armed = False
+        self._stops_ns = None
         self._announcement = None  # the stop frame states more
 
     def _start_pulse(self, now_ns: int, on_times_ms: tuple[int, ...]) -> None:

@@ -13,6 +13,9 @@ MAX_ON_TIME_MS = 127  # 7 bits
 COUNTER_MODULUS = 16  # 4 bits, for counters and pulse ids alike
 COMMAND_PERIOD_S = 0.020
 SILENCE_CLOSES_S = 0.100  # dead-man of the node and staleness limit of the guard
+SILENCE_LANDS_S = 1.0  # a node without commands for so long cuts its float air
+GRACE_STEPS_PER_S = 10  # a stop frame counts its grace in units of 100 ms
+MAX_GRACE_S = 25.5  # 8 bits
 
 ARM_KEY = 0xA5  # an all-zero or all-one frame never arms
 
@@ -47,16 +50,24 @@ class NodeFault(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Close all valves and disarm. Every frame with a stop identifier stops, whatever its bytes."""
+    """Close all valves, cut the float air, disarm: at once, or when a grace is over.
+
+    Every frame with a stop identifier stops, whatever its bytes; a frame without grace stops at once.
+    """
 
     vehicle: int
     """Addressee, or EVERY_VEHICLE."""
     reason: int = StopReason.UNSPECIFIED
+    grace_s: float = 0.0
+    """How long the node still obeys commands, 0 to 25.5 s; sent in whole steps of 100 ms, rounded up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """Arm (or disarm) one node. Needs the key; a node starts disarmed and a stop disarms it."""
+    """Arm (or disarm) one node. Needs the key; a node starts disarmed and a stop disarms it.
+
+    Either kind acknowledges a stop that is over. The air stays as it is.
+    """
 
     vehicle: int
     is_armed: bool
@@ -110,6 +121,10 @@ class ValveStatus:
     """Bits of NodeFault."""
     rejected_commands: int = 0
     """Commands refused (repeated counter, disarmed), modulo 256."""
+    is_stop_pending: bool = False
+    """A stop was received and its grace still runs."""
+    is_landed_by_silence: bool = False
+    """Air cut and disarmed because commands were silent for 1 s; until armed, disarmed or floated again."""
 
 
 @dataclass(frozen=True, slots=True)

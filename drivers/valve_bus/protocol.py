@@ -20,9 +20,12 @@ from drivers.valve_bus.messages import (
     COMMAND_PERIOD_S,
     COUNTER_MODULUS,
     EVERY_VEHICLE,
+    GRACE_STEPS_PER_S,
+    MAX_GRACE_S,
     MAX_ON_TIME_MS,
     MAX_VEHICLES,
     SILENCE_CLOSES_S,
+    SILENCE_LANDS_S,
     VALVES,
     Arm,
     FloatAir,
@@ -40,10 +43,10 @@ from drivers.valve_bus.messages import (
 
 __all__ = [
     "ARM_ID", "ARM_KEY", "COMMAND_ID", "COMMAND_PERIOD_S", "COUNTER_MODULUS", "EVERY_VEHICLE", "FLOAT_AIR_ID",
-    "HEARTBEAT_ID", "MAX_ON_TIME_MS", "MAX_VEHICLES", "PRESSURE_ID", "SILENCE_CLOSES_S", "STATUS_ID",
-    "STOP_ID", "VALVES", "Arm", "CanFrame", "FloatAir", "Heartbeat", "NodeFault", "NodeState", "Stop",
-    "StopReason", "TankPressure", "Undecodable", "ValveBusMessage", "ValveCommand", "ValveStatus",
-    "database", "decode", "encode",
+    "HEARTBEAT_ID", "MAX_GRACE_S", "MAX_ON_TIME_MS", "MAX_VEHICLES", "PRESSURE_ID", "SILENCE_CLOSES_S",
+    "SILENCE_LANDS_S", "STATUS_ID", "STOP_ID", "VALVES", "Arm", "CanFrame", "FloatAir",
+    "Heartbeat", "NodeFault", "NodeState", "Stop", "StopReason", "TankPressure", "Undecodable",
+    "ValveBusMessage", "ValveCommand", "ValveStatus", "database", "decode", "encode",
 ]  # fmt: skip
 
 STOP_ID = 0x000
@@ -88,6 +91,8 @@ def encode(message: ValveBusMessage) -> CanFrame:
         data = database().get_message_by_frame_id(base_id).encode(signals)
     except (EncodeError, OverflowError) as error:
         raise ValueError(f"{type(message).__name__} does not fit its frame: {error}") from error
+    if isinstance(message, Stop) and message.grace_s == 0.0:
+        data = data[:1]  # no grace is no second byte, as before there was one
     return CanFrame(base_id + message.vehicle, data)
 
 
@@ -95,7 +100,9 @@ def decode(frame: CanFrame) -> ValveBusMessage | Undecodable:
     """The message of a frame; never raises, since the bus may carry other people's frames."""
     base_id, vehicle = frame.arbitration_id & ~_VEHICLE_BITS, frame.arbitration_id & _VEHICLE_BITS
     if base_id == STOP_ID:  # stops whatever its bytes, so none may keep it from being understood
-        return Stop(vehicle, frame.data[0] if frame.data else StopReason.UNSPECIFIED)
+        reason = frame.data[0] if frame.data else StopReason.UNSPECIFIED
+        steps = frame.data[1] if len(frame.data) > 1 else 0
+        return Stop(vehicle, reason, steps / GRACE_STEPS_PER_S)
     if vehicle >= MAX_VEHICLES or (base_id not in _FROM_VALUES and base_id not in _FROM_SIGNALS):
         return Undecodable(frame, "foreign_identifier")
     from_values = _FROM_VALUES.get(base_id)
@@ -132,10 +139,18 @@ def _signals(message: TankPressure | Heartbeat | Stop | Arm | FloatAir) -> tuple
                 "CanErrorCount": message.can_error_count,
             }
         case Stop():
-            return STOP_ID, {"Reason": int(message.reason)}
+            return STOP_ID, {"Reason": int(message.reason), "Grace": _whole_steps(message.grace_s)}
         case Arm():
             return ARM_ID, {"IsArmed": message.is_armed, "Key": message.key}
     return FLOAT_AIR_ID, {"IsOn": message.is_on, "Counter": message.counter}
+
+
+def _whole_steps(grace_s: float) -> float:
+    """Rounded up, since 0 would be a stop at once."""
+    if not 0.0 <= grace_s <= MAX_GRACE_S:
+        raise ValueError(f"a grace of {grace_s} s is outside 0..{MAX_GRACE_S}")
+    steps = math.ceil(round(grace_s * GRACE_STEPS_PER_S, 6))  # 0.3 * 10 is a hair above 3
+    return (max(1, steps) if grace_s > 0.0 else 0) / GRACE_STEPS_PER_S
 
 
 def _sensor(value: float) -> float | str:
@@ -168,12 +183,15 @@ def _status_values(message: ValveStatus) -> tuple[int, ...]:
         message.counter,
         message.valve_fault_mask,
         int(message.node_faults),
+        message.is_stop_pending,
+        message.is_landed_by_silence,
         message.rejected_commands,
     )
 
 
 def _status(vehicle: int, values: Sequence[int]) -> ValveStatus:
-    mask, executed, pulse, armed, dead_man, stopped, floating, counter, faulty, node_faults, rejected = values
+    mask, executed, pulse, armed, dead_man, stopped, floating, counter, faulty, node_faults, *rest = values
+    is_pending, is_landed, rejected = rest
     return ValveStatus(
         vehicle=vehicle,
         open_mask=mask,
@@ -187,6 +205,8 @@ def _status(vehicle: int, values: Sequence[int]) -> ValveStatus:
         valve_fault_mask=faulty,
         node_faults=NodeFault(node_faults),
         rejected_commands=rejected,
+        is_stop_pending=bool(is_pending),
+        is_landed_by_silence=bool(is_landed),
     )
 
 
@@ -194,7 +214,8 @@ _ORDER = {
     COMMAND_ID: ("Counter", "PulseId", *(f"OnTime{valve}" for valve in range(VALVES))),
     STATUS_ID: (
         "OpenMask", "ExecutedCounter", "ExecutedPulseId", "IsArmed", "IsDeadManClosed", "IsStopped",
-        "IsFloatAirOn", "Counter", "ValveFaultMask", "NodeFaults", "RejectedCommands",
+        "IsFloatAirOn", "Counter", "ValveFaultMask", "NodeFaults", "IsStopPending", "IsLandedBySilence",
+        "RejectedCommands",
     ),
 }  # fmt: skip
 """Signals of the frames packed here, as `_command` and `_status` count them."""

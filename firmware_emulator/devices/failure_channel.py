@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from drivers.laboratory import LABORATORY_CHANNEL, ChannelKind, FailureEvent, FailureRefused, InjectOrder
+from firmware_emulator.applicability import why_not
 from firmware_emulator.config import LaboratoryConfig
 from firmware_emulator.device_kind import DeviceKind
 from firmware_emulator.devices.pending import take_until
@@ -25,12 +26,18 @@ class FailureDesk:
     Args:
         failures: Of each vehicle.
         kinds: Every kind of failure.
+        config: The scenario, which a failure may lack something in.
         start_ns: Laboratory time that failures count from.
     """
 
     def __init__(
-        self, failures: Mapping[str, Failures], kinds: Mapping[str, FailureKind], start_ns: int
+        self,
+        failures: Mapping[str, Failures],
+        kinds: Mapping[str, FailureKind],
+        config: LaboratoryConfig,
+        start_ns: int,
     ) -> None:
+        self._config = config
         self._failures, self._kinds, self._start_ns = dict(failures), dict(kinds), start_ns
         self._edges: list[tuple[int, bool, int, str, Failure]] = []  # stamp, begins, count, vehicle, failure
         self._count = 0
@@ -68,6 +75,10 @@ class FailureDesk:
                 known = ", ".join(self._failures)
                 raise ValueError(f"there is no vehicle {data.vehicle!r}; there are {known}")
             parameters = checked(data.kind, data.parameters, self._kinds)
+            (mock_up,) = [row for row in self._config.vehicles if row.name == data.vehicle]
+            reason = why_not(data.kind, self._kinds[data.kind], mock_up, self._config)
+            if reason:
+                raise ValueError(f"failure {data.kind!r} of {data.vehicle!r} cannot happen: {reason}")
             if not (0.0 < data.for_s <= LONGEST_S or data.for_s == math.inf):
                 raise ValueError(f"for_s must be positive and at most {LONGEST_S:g} s, got {data.for_s:g}")
         except ValueError as error:
@@ -89,7 +100,7 @@ class FailureDesk:
 def build(site: Site, config: LaboratoryConfig) -> FailureDesk:
     """The desk of a laboratory."""
     failures = {mock_up.name: mock_up.failures for mock_up in site.mock_ups}
-    return FailureDesk(failures, site.failure_kinds, site.scenario.start_ns)
+    return FailureDesk(failures, site.failure_kinds, config, site.scenario.start_ns)
 
 
 LABORATORY = DeviceKind(

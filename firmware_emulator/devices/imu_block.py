@@ -35,7 +35,7 @@ from firmware_emulator.devices.imu_sensors import Disturbances, ImuSensors
 from firmware_emulator.devices.sensor_errors import WarmUp
 from firmware_emulator.devices.serial_line import PACKET_BYTES, SerialLine
 from firmware_emulator.failures import Failures
-from firmware_emulator.plant.motion_state import PollGrid, last_polls
+from firmware_emulator.plant.motion_state import PollGrid
 from firmware_emulator.plant.rigid_body import Vehicle
 
 GYRO_START_NS = 35_000_000  # ADIS16100 data sheet
@@ -60,7 +60,7 @@ class ImuBlock:
         averaging: Polls per frame.
         serial_number: For identify.
         warm_up: Its temperature.
-        failures: `stuck_gyro`, `dead_tilt`.
+        failures: Those of an IMU block (`Ailments`).
         rng: For the noise of temperature readings.
         start_ns: Power-up.
     """
@@ -138,28 +138,35 @@ class ImuBlock:
         self._vehicle.advance(stamp_ns)
         temperature_c = self._warm_up.at((stamp_ns - self._start_ns) / 1e9)
         disturbances = self._ailments.at(stamp_ns - self._start_ns, self._window_end)
-        felt = last_polls(self._vehicle.take_felt(), self._window)
+        felt = self._vehicle.take_felt()[-self._window :]  # a block that restarts misses those before
         gyro, tilts = self._sensors.average(felt, temperature_c, disturbances)
         self._ailments.held_gyro_code = round(gyro)
         self._frames += 1
+        jumped_ms = self._ailments.jumped_ms(stamp_ns - self._start_ns)
         if self._version == 1:
             frame = encode_v1(
-                sequence=self._frames,
+                sequence=self._frames + round(jumped_ms / self._window),
                 gyro_counts=gyro,
                 tilt_difference_counts=(tilts[0] - tilts[1], tilts[2] - tilts[3]),
             )
         else:
             status = self._status(disturbances, tilts)
             frame = encode_v2(
-                tick_ms=self._window_end - self._boot_poll,
+                tick_ms=self._window_end - self._boot_poll + jumped_ms,
                 sample_count=self._window,
                 gyro_counts=gyro,
                 tilt_counts=tilts,
                 housekeeping=self._housekeeping(temperature_c, status),
                 attention=bool(status & _ATTENTION),
             )
-        self.line.send(stamp_ns + FRAME_DELAY_NS, frame)
+        self._send(stamp_ns, frame)
         self._begin_window(self._window_end)
+
+    def _send(self, stamp_ns: int, data: bytes) -> int:
+        """Put a frame on the line, unless the block is silent; return when the line is free."""
+        if self._ailments.is_silent(stamp_ns - self._start_ns):
+            return max(stamp_ns, self.line.free_ns)
+        return self.line.send(stamp_ns + FRAME_DELAY_NS, data)
 
     def _begin_window(self, last_poll: int) -> None:
         self._window = self._averaging
@@ -189,12 +196,14 @@ class ImuBlock:
 
     def _obey(self, command: Command, stamp_ns: int) -> None:
         poll = self._grid.last_poll(stamp_ns)
+        age_ns = stamp_ns - self._start_ns
         reply: Reply
         match command:
             case Ping(tag):
-                reply = Pong(tag, (poll - self._boot_poll) & 0xFFFF)
+                reply = Pong(tag, (poll - self._boot_poll + self._ailments.jumped_ms(age_ns)) & 0xFFFF)
             case Identify(tag):
-                reply = Identity(tag, self._version, *FIRMWARE, self._serial_number, self._averaging)
+                serial_number = self._ailments.serial_number(self._serial_number, age_ns)
+                reply = Identity(tag, self._version, *FIRMWARE, serial_number, self._averaging)
             case BadCommand(tag, kind, result):
                 self._refused += 1
                 reply = Ack(tag, kind, result)
@@ -209,7 +218,7 @@ class ImuBlock:
                 reply = Ack(tag, _COMMAND_TYPE[SelfTest], AckResult.DONE)
             case Reset(tag):
                 reply = Ack(tag, _COMMAND_TYPE[Reset], AckResult.DONE)
-        sent_ns = self.line.send(stamp_ns + FRAME_DELAY_NS, encode_reply(reply))
+        sent_ns = self._send(stamp_ns, encode_reply(reply))
         if isinstance(command, Reset):
             self._restart(sent_ns)
 

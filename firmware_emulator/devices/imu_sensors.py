@@ -37,6 +37,8 @@ class Disturbances:
     """What a self-test or a failure does to the codes of one window."""
 
     gyro_add_counts: float = 0.0
+    tilt_add_counts: tuple[float, float] = (0.0, 0.0)
+    """Of each chip: added to its X, taken from its Y."""
     gyro_stuck_code: float | None = None
     forced_tilts: dict[int, float] = field(default_factory=dict)
     """Tilt channel 0..3 (x.X, x.Y, y.X, y.Y) to the code it is forced to."""
@@ -102,9 +104,15 @@ class ImuSensors:
         self._walk_rad_s = 0.0
         self._outlier_rate_hz = outlier_rate_hz
         self._polls_to_outlier = self._draw_outlier()
+        (bias_x, bias_y), (tempco_x, tempco_y) = errors.acc_bias_m_s2, errors.acc_tempco_m_s2_k
+        (scale_x, scale_y), (cross_x, cross_y) = errors.acc_scale, errors.acc_cross
+        # Codes are linear in rate, force x and force y: gain, and null at 25 deg C and per kelvin.
+        self._gain = _counts([errors.gyro_scale, 0.0, 0.0], [0.0, scale_x, cross_x], [0.0, cross_y, scale_y])
+        self._null = _counts([errors.gyro_bias_rad_s], [bias_x], [bias_y])
+        self._null_tempco = _counts([errors.gyro_tempco_rad_s_k], [tempco_x], [tempco_y])
         # What X + Y is off 2048 by is shared by both channels.
-        self._null_x = TILT_NULL + errors.imbalance_counts[0] / 2.0
-        self._null_y = TILT_NULL + errors.imbalance_counts[1] / 2.0
+        null_x, null_y = (TILT_NULL + imbalance / 2.0 for imbalance in errors.imbalance_counts)
+        self._null += [[GYRO_NULL], [null_x], [null_x], [null_y], [null_y]]
         self._top = np.array([[GYRO_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP], [TILT_TOP]])
 
     @staticmethod
@@ -123,14 +131,18 @@ class ImuSensors:
         self, felt: Sequence[Felt], temperature_c: float, disturbances: Disturbances | None = None
     ) -> Array:
         """Codes of every poll, shape (5, polls): gyro, x.X, x.Y, y.X, y.Y."""
-        polls = sum(part.polls for part in felt)
-        signal = self._signal(felt, polls, temperature_c) + self._next_noise(polls)
+        polls = len(felt)
+        signal = self._signal(felt, temperature_c)
+        signal += self._next_noise(polls)
         if self._gyro_filter:
             signal[:1] = self._gyro_filter(signal[:1])
         if self._tilt_filter:
             signal[1:] = self._tilt_filter(signal[1:])
         if disturbances:
             signal[0] += disturbances.gyro_add_counts
+            for channel, counts in enumerate(disturbances.tilt_add_counts):
+                signal[1 + 2 * channel] += counts
+                signal[2 + 2 * channel] -= counts
         np.rint(signal, out=signal)
         np.maximum(signal, 0.0, out=signal)
         np.minimum(signal, self._top, out=signal)
@@ -140,39 +152,19 @@ class ImuSensors:
             self._spoil(signal, polls)
         return signal
 
-    def _signal(self, felt: Sequence[Felt], polls: int, temperature_c: float) -> Array:
-        """Noise-free codes, shape (5, polls), or (5, 1) where all polls are alike."""
+    def _signal(self, felt: Sequence[Felt], temperature_c: float) -> Array:
+        """Noise-free codes, shape (5, polls)."""
         errors = self._errors
         warmer_k = temperature_c - REFERENCE_C
         self._walk_rad_s += (
-            errors.gyro_walk_rad_s_sqrt_s * math.sqrt(polls * _POLL_S) * self._rng.standard_normal()
+            errors.gyro_walk_rad_s_sqrt_s * math.sqrt(len(felt) * _POLL_S) * self._rng.standard_normal()
         )
-        null_rad_s = errors.gyro_bias_rad_s + errors.gyro_tempco_rad_s_k * warmer_k + self._walk_rad_s
-        gyro_gain = GYRO_COUNTS_PER_RAD_S * errors.gyro_scale
-        gyro_gain *= 1.0 + errors.gyro_scale_tempco_per_k * warmer_k
-        null_x = errors.acc_bias_m_s2[0] + errors.acc_tempco_m_s2_k[0] * warmer_k
-        null_y = errors.acc_bias_m_s2[1] + errors.acc_tempco_m_s2_k[1] * warmer_k
-        gyro_null = GYRO_NULL + null_rad_s * GYRO_COUNTS_PER_RAD_S
-        signal = np.empty((_CHANNELS, polls))
-        start = 0
-        for part in felt:
-            end = start + part.polls
-            force_x, force_y = part.force_x_m_s2, part.force_y_m_s2
-            x = errors.acc_scale[0] * force_x + (errors.acc_cross[0] * force_y + null_x)
-            y = errors.acc_scale[1] * force_y + (errors.acc_cross[1] * force_x + null_y)
-            x_counts, y_counts = x * TILT_COUNTS_PER_M_S2, y * TILT_COUNTS_PER_M_S2
-            codes = (
-                gyro_null + gyro_gain * part.rate_rad_s,
-                self._null_x + x_counts,
-                self._null_x - x_counts,
-                self._null_y + y_counts,
-                self._null_y - y_counts,
-            )
-            if len(felt) == 1 and isinstance(part.rate_rad_s, float):
-                return np.array(codes)[:, None]
-            for row, code in zip(signal, codes, strict=True):
-                row[start:end] = code
-            start = end
+        gyro_scale = errors.gyro_scale * (1.0 + errors.gyro_scale_tempco_per_k * warmer_k)
+        self._gain[0, 0] = GYRO_COUNTS_PER_RAD_S * gyro_scale
+        null = self._null + self._null_tempco * warmer_k
+        null[0, 0] += GYRO_COUNTS_PER_RAD_S * self._walk_rad_s
+        signal: Array = np.dot(self._gain, np.array(felt).T)
+        signal += null
         return signal
 
     def _next_noise(self, polls: int) -> Array:
@@ -202,3 +194,10 @@ class ImuSensors:
             codes[channel, self._polls_to_outlier - 1] = self._rng.integers(int(self._top[channel, 0]) + 1)
             self._polls_to_outlier += self._draw_outlier()
         self._polls_to_outlier -= polls
+
+
+def _counts(gyro_rad_s: list[float], x_m_s2: list[float], y_m_s2: list[float]) -> Array:
+    """Rows of gyro and tilt chips in counts of the five channels; the second channel of a chip is opposed."""
+    gyro, x, y = np.array(gyro_rad_s), np.array(x_m_s2), np.array(y_m_s2)
+    tilts = TILT_COUNTS_PER_M_S2 * np.array([x, -x, y, -y])
+    return np.vstack([GYRO_COUNTS_PER_RAD_S * gyro, tilts])

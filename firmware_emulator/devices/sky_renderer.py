@@ -51,15 +51,26 @@ class SkyRenderer:
     @staticmethod
     def exposure(fields: dict[str, Any]) -> Exposure:
         """The exposure that `dataclasses.asdict` made into `fields`."""
-        failures = fields.pop("sky_failures")
-        return Exposure(**fields, sky_failures=None if failures is None else SkyFailures(**failures))
+        failures, lower = fields["sky_failures"], fields["lower"]
+        given = fields | {
+            "sky_failures": None if failures is None else SkyFailures(**failures),
+            "lower": None if lower is None else SkyRenderer.exposure(lower),
+        }
+        return Exposure(**given)
 
     def render(self, exposure: Exposure) -> NDArray[np.uint8]:
         """The picture, shape (height, width)."""
+        picture = self._draw(exposure)
+        if exposure.lower is not None:
+            half = picture.shape[0] // 2
+            picture[half:] = self._draw(exposure.lower)[half:]
+        return picture
+
+    def _draw(self, exposure: Exposure) -> NDArray[np.uint8]:
         return self._camera.render(
             exposure.start,
             exposure.end,
-            sequence=exposure.sequence,
+            sequence=exposure.noise,
             is_sky_dead=exposure.is_sky_dead,
             false_lights=exposure.false_lights,
             sky_failures=exposure.sky_failures,

@@ -4,8 +4,10 @@ What the picture shows is the business of `firmware_emulator.sky`, behind a `Ren
 drawn at once (lockstep) or by another process (live).
 """
 
+import math
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from drivers.laboratory import ChannelKind
 from firmware_emulator.device_kind import DeviceKind, PictureOrder
 from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
+from firmware_emulator.devices.repeated_pictures import RepeatedPictures
 from firmware_emulator.failures import Failures
 from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
@@ -38,6 +41,8 @@ class Exposure:
         is_sky_dead: The lights are off.
         false_lights: Lights to add that no catalogue knows.
         sky_failures: LEDs that differ from the list; None if all hang and shine as listed.
+        noise: Number that decides the picture's noise; an older one where the camera repeats a picture.
+        lower: What the lower half shows, of a torn picture.
     """
 
     sequence: int
@@ -48,6 +53,8 @@ class Exposure:
     is_sky_dead: bool
     false_lights: int
     sky_failures: SkyFailures | None = None
+    noise: int = 0
+    lower: "Exposure | None" = None
 
 
 class StarCamera:
@@ -60,7 +67,7 @@ class StarCamera:
         readout_s: From the first row's exposure to the last one's.
         delay_s: From the middle of the exposure until the picture is at the host.
         delay_jitter_s: Its standard deviation.
-        failures: `dead_sky`, `frozen_camera`, `silent_camera`, `false_lights`, those of the sky.
+        failures: Those of a camera and of the sky.
         rng: For the jitter.
         start_ns: First exposure begins one period later.
     """
@@ -85,7 +92,8 @@ class StarCamera:
         self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._opens_ns = start_ns + self._period_ns
         self._start: Motion | None = None
-        self._frozen: tuple[Pose, Pose] | None = None
+        self._repeated: RepeatedPictures[Exposure] = RepeatedPictures(failures)
+        self._before: Exposure | None = None
         self._sequence = 0
         self._last_arrival_ns = 0
         self._pending: deque[tuple[int, Exposure]] = deque()
@@ -109,21 +117,28 @@ class StarCamera:
         if self._start is None:
             self._start = self._vehicle.origin_at(now_ns)
             return
-        start, end = _pose(self._start), _pose(self._vehicle.origin_at(now_ns))
+        start, end = self._start, self._vehicle.origin_at(now_ns)
         self._start = None
         middle_ns = self._opens_ns + self._open_ns // 2
         self._opens_ns += self._period_ns
         age_ns = middle_ns - self._start_ns
         jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
-        arrival_ns = max(now_ns, middle_ns + self._delay_ns + round(jitter * self._jitter_ns))
+        slow = self._failures.active("slow_camera", age_ns)
+        late_ns = self._delay_ns + (round(slow.parameters["delay_s"] * NS_PER_S) if slow else 0)
+        arrival_ns = max(now_ns, middle_ns + late_ns + round(jitter * self._jitter_ns))
         self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
-        if not self._failures.active("frozen_camera", age_ns):
-            self._frozen = None
-        elif self._frozen is None:
-            self._frozen = (start, end)
-        start, end = self._frozen or (start, end)
+        is_skipped = slow is not None and self._sequence % int(slow.parameters["keep_one_in"]) != 0
+        exposure = self._exposed(_pose(start), _pose(end), middle_ns, age_ns)
+        self._sequence += 1
+        if not (is_skipped or self._failures.active("silent_camera", age_ns)):
+            self._pending.append((exposure.arrival_ns, exposure))
+
+    def _exposed(self, start: Pose, end: Pose, middle_ns: int, age_ns: int) -> Exposure:
+        """What is sent of the exposure between two poses."""
+        for wrong in self._failures.all_active("wrong_fixes", age_ns):
+            start, end = displaced(start, wrong.parameters), displaced(end, wrong.parameters)
         false_lights = self._failures.active("false_lights", age_ns)
-        exposure = Exposure(
+        seen = Exposure(
             self._sequence,
             start,
             end,
@@ -132,10 +147,12 @@ class StarCamera:
             self._failures.active("dead_sky", age_ns) is not None,
             int(false_lights.parameters["count"]) if false_lights else 0,
             self._sky_failures(age_ns),
+            noise=self._sequence,
         )
-        self._sequence += 1
-        if not self._failures.active("silent_camera", age_ns):
-            self._pending.append((exposure.arrival_ns, exposure))
+        is_torn = self._failures.active("torn_camera", age_ns) is not None
+        before, self._before = self._before, seen
+        shown = self._repeated.shown(replace(seen, lower=before) if is_torn else seen, age_ns)
+        return replace(shown, sequence=seen.sequence, middle_ns=seen.middle_ns, arrival_ns=seen.arrival_ns)
 
     def _sky_failures(self, age_ns: int) -> SkyFailures | None:
         dead, moved, new = (
@@ -163,6 +180,11 @@ class StarCamera:
 
 def _pose(motion: Motion) -> Pose:
     return motion.x_m, motion.y_m, motion.heading_rad
+
+
+def displaced(pose: Pose, by: Mapping[str, float]) -> Pose:
+    """A camera there sees what one here sees of a sky that was moved the other way."""
+    return pose[0] + by["dx_m"], pose[1] + by["dy_m"], pose[2] + math.radians(by["dheading_deg"])
 
 
 def build(mock_up: MockUp, settings: CameraConfig) -> StarCamera | None:

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from drivers.laboratory import ChannelKind
-from drivers.valve_bus.protocol import CanFrame
+from drivers.valve_bus.frame import MAX_DATA_BYTES, CanFrame
 from firmware_emulator.config import LaboratoryConfig
 from firmware_emulator.device_kind import DeviceKind
 from firmware_emulator.devices.pending import take_until
@@ -32,6 +32,7 @@ class ValveBus:
         self._nodes = nodes
         self._bit_ns = NS_PER_S / bitrate
         self._free_ns = 0
+        self._longest_ns = self._duration_ns(MAX_DATA_BYTES)
         self._shortest_ns = self._duration_ns(_SHORTEST_BYTES)
         self._pending: deque[tuple[int, CanFrame]] = deque()
         self._due_ns = [node.next_ns for node in self._nodes]
@@ -65,6 +66,11 @@ class ValveBus:
             for frame in node.outbox:
                 self._pending.append((self._transmit(now_ns, frame), frame))
             node.outbox.clear()
+            for frame in node.babbled:
+                # One may wait for the frame on the wire; more are never sent, so that nothing queues up.
+                if self._free_ns - now_ns < self._longest_ns:
+                    self._pending.append((self._transmit(now_ns, frame), frame))
+            node.babbled.clear()
 
     def take(self, until_ns: int) -> list[tuple[int, CanFrame]]:
         """Frames that reached the host up to `until_ns`."""

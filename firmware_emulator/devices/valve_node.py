@@ -1,7 +1,8 @@
 """The CAN node of one vehicle: commands to coil currents, and what it reports about itself.
 
-A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man, silence
-of 100 ms closes all, a stop closes all and disarms (`docs/interfaces/valve_bus.md`).
+A new pulse id sets every valve's remaining on-time, an unchanged one only refreshes the dead-man. Silence
+of 100 ms closes all; silence of 1 s, or a stop whose grace is over, closes all, cuts the float air and
+disarms (`docs/interfaces/valve_bus.md`).
 """
 
 from collections import deque
@@ -26,6 +27,9 @@ from drivers.valve_bus.protocol import (
     decode,
     encode,
 )
+from firmware_emulator.devices.babble import Babble
+from firmware_emulator.devices.landing_rules import LandingRules
+from firmware_emulator.devices.valve_failures import ValveFailures
 from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, NS_PER_S
@@ -38,7 +42,6 @@ _MS = 1_000_000
 _TANK_NOISE_PA = 20e3
 _SUPPLY_NOISE_PA = 500.0
 _GAS_K = 293.0
-_STUCK_KINDS = ("stuck_open_valve", "stuck_closed_valve", "leaking_valve")
 
 
 class ValveNode:
@@ -69,15 +72,20 @@ class ValveNode:
         self._failures, self._rng, self._start_ns = failures, rng, start_ns
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self.outbox: list[CanFrame] = []  # what it sends now
+        self.babbled: list[CanFrame] = []  # and what it ought not to
         # Fifty times a second, and nearly always one of the sixteen counters with nothing else new.
         self._encode_status: Callable[[ValveStatus], CanFrame] = lru_cache(256)(encode)
         self._off_ns: dict[int, int] = {}  # energised valves and when their time is up
         self._dead_man_ns = FAR_FUTURE_NS
+        self._landing = LandingRules(start_ns)
         # Nodes do not power up at the same moment: their cycles are spread over the bus.
         self._status_ns = start_ns + STATUS_NS + index * 1_300_000
         self._slow_ns = start_ns + SLOW_NS + index * 1_300_000 + 600_000
-        failures.watch("valves", self._set_valve_failures)
-        self._is_armed = self._is_stopped = self._is_dead_man_closed = False
+        self._ailments = ValveFailures(vehicle, failures, start_ns)
+        self._babble = Babble(index, failures, start_ns)
+        self._last_status: CanFrame | None = None
+        failures.watch("valves", self._notice_failure)
+        self._is_armed = self._is_dead_man_closed = False
         self._is_air_on = vehicle.is_floating
         self._last_counter: int | None = None
         self._last_pulse_id: int | None = None
@@ -86,7 +94,7 @@ class ValveNode:
     @property
     def next_ns(self) -> int:
         """Moment of the next thing it does."""
-        next_ns = min(self.next_output_ns, self._dead_man_ns)
+        next_ns = min(self.next_output_ns, self._dead_man_ns, self._landing.next_ns, self._ailments.next_ns)
         if self._off_ns:
             next_ns = min(next_ns, *self._off_ns.values())
         if self._inbox:
@@ -96,7 +104,7 @@ class ValveNode:
     @property
     def next_output_ns(self) -> int:
         """When it next sends something."""
-        return min(self._status_ns, self._slow_ns)
+        return min(self._status_ns, self._slow_ns, self._babble.next_ns)
 
     def receive(self, stamp_ns: int, frame: CanFrame) -> None:
         """A frame that is complete on the bus at `stamp_ns`."""
@@ -104,12 +112,14 @@ class ValveNode:
 
     def run(self, now_ns: int) -> None:
         """Do what is due at `now_ns`: time-outs first, then what was received, then send."""
+        self._ailments.run(now_ns)
         for valve in [valve for valve, off_ns in self._off_ns.items() if off_ns <= now_ns]:
             self._close([valve], now_ns)
         if self._dead_man_ns <= now_ns:
             self._dead_man_ns = FAR_FUTURE_NS
             self._is_dead_man_closed = True
             self._close(list(self._off_ns), now_ns)
+        self._land_if_due(now_ns)
         is_silent = self._failures.active("silent_bus", now_ns - self._start_ns) is not None
         while self._inbox and self._inbox[0][0] <= now_ns:
             _, frame = self._inbox.popleft()
@@ -123,15 +133,30 @@ class ValveNode:
             case ValveCommand(vehicle=self._index):
                 self._command(message, now_ns)
             case Stop(vehicle=vehicle) if vehicle in (self._index, EVERY_VEHICLE):
-                self._close(list(self._off_ns), now_ns)
-                self._is_armed, self._is_stopped = False, True
-                self._dead_man_ns = FAR_FUTURE_NS
-            case Arm(vehicle=self._index, key=key) if key == ARM_KEY:
+                self._landing.stop(now_ns, message.grace_s)
+                self._land_if_due(now_ns)
+            case Arm(vehicle=self._index, key=key) if key == ARM_KEY and (
+                self._landing.may_arm or not message.is_armed
+            ):
                 self._arm(message.is_armed, now_ns)
-            case FloatAir(vehicle=self._index):
-                self._vehicle.advance(now_ns)
-                self._vehicle.set_air(now_ns, message.is_on, self._float_delay_s)
-                self._is_air_on = message.is_on
+            case FloatAir(vehicle=self._index, is_on=False):
+                self._switch_air(now_ns, is_on=False)
+            case FloatAir(vehicle=self._index) if self._landing.may_float:
+                self._landing.float_on()
+                self._switch_air(now_ns, is_on=True)
+
+    def _land_if_due(self, now_ns: int) -> None:
+        """Close all valves, cut the float air and disarm, if a stop or the silence of commands wants it."""
+        if self._landing.must_land(now_ns, is_up=self._is_armed or self._is_air_on):
+            self._close(list(self._off_ns), now_ns)
+            self._is_armed = False
+            self._dead_man_ns = FAR_FUTURE_NS
+            self._switch_air(now_ns, is_on=False)
+
+    def _switch_air(self, now_ns: int, *, is_on: bool) -> None:
+        self._vehicle.advance(now_ns)
+        self._vehicle.set_air(now_ns, is_on, self._float_delay_s)
+        self._is_air_on = is_on
 
     def _arm(self, is_armed: bool, now_ns: int) -> None:
         if is_armed and not self._is_armed:
@@ -139,9 +164,11 @@ class ValveNode:
         if not is_armed:
             self._close(list(self._off_ns), now_ns)
             self._dead_man_ns = FAR_FUTURE_NS
-        self._is_armed, self._is_stopped, self._is_dead_man_closed = is_armed, False, False
+        self._is_armed, self._is_dead_man_closed = is_armed, False
+        self._landing.arm()
 
     def _command(self, command: ValveCommand, now_ns: int) -> None:
+        self._landing.command(now_ns, command.counter)
         if not self._is_armed or command.counter == self._last_counter:
             self._rejected += 1
             return
@@ -168,29 +195,23 @@ class ValveNode:
             del self._off_ns[valve]
             self._vehicle.thrusters.release(now_ns, valve)
 
-    def _set_valve_failures(self, now_ns: int) -> None:
-        age_ns = now_ns - self._start_ns
-        found = {kind: self._failures.all_active(kind, age_ns) for kind in _STUCK_KINDS}
-        self._vehicle.advance(now_ns)
-        self._vehicle.thrusters.set_failures(
-            {int(failure.parameters["valve"]) for failure in found["stuck_open_valve"]},
-            {int(failure.parameters["valve"]) for failure in found["stuck_closed_valve"]},
-            {
-                int(failure.parameters["valve"]): failure.parameters["fraction"]
-                for failure in found["leaking_valve"]
-            },
-        )
+    def _notice_failure(self, _: int) -> None:
+        self._babble.begin(self._status_ns)
 
     def _send_due(self, now_ns: int, is_silent: bool) -> None:
         if self._status_ns <= now_ns:
             self._status_ns += STATUS_NS
             self._status_counter = (self._status_counter + 1) & 0xF
             if not is_silent:
-                self.outbox.append(self._status())
+                self._last_status = self._status()
+                self.outbox.append(self._last_status)
         if self._slow_ns <= now_ns:
             self._slow_ns += SLOW_NS
             if not is_silent:
                 self.outbox += [encode(message) for message in self._slow_messages(now_ns)]
+        frame = self._babble.take(now_ns, self._last_status)
+        if frame is not None:
+            self.babbled.append(frame)
 
     def _status(self) -> CanFrame:
         mask = 0
@@ -205,9 +226,12 @@ class ValveNode:
                 counter=self._status_counter,
                 is_armed=self._is_armed,
                 is_dead_man_closed=self._is_dead_man_closed,
-                is_stopped=self._is_stopped,
+                is_stopped=self._landing.is_stopped,
                 is_float_air_on=self._is_air_on,
+                node_faults=self._ailments.node_faults,
                 rejected_commands=self._rejected & 0xFF,
+                is_stop_pending=self._landing.is_stop_pending,
+                is_landed_by_silence=self._landing.is_landed_by_silence,
             )
         )
 
@@ -215,7 +239,7 @@ class ValveNode:
         self._vehicle.advance(now_ns)
         tank_noise, supply_noise = self._rng.standard_normal(2)
         bank = self._vehicle.thrusters
-        state = NodeState.STOPPED if self._is_stopped else NodeState.DISARMED
+        state = NodeState.STOPPED if self._landing.is_stopped else NodeState.DISARMED
         return (
             TankPressure(
                 self._index,

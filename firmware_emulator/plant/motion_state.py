@@ -1,13 +1,10 @@
 """State of a rigid body in the plane, and what its IMU feels."""
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
+Felt = tuple[float, float, float]
+"""What the IMU feels at one poll: rate in rad/s, specific force at its place along body x and y in m/s^2."""
 
 
 class Motion(NamedTuple):
@@ -36,38 +33,6 @@ class Motion(NamedTuple):
             self.vy_m_s + self.rate_rad_s * dx,
             self.rate_rad_s,
         )
-
-
-@dataclass(slots=True)
-class Felt:
-    """What the IMU feels at some successive polls: specific force at its place, and rate, body axes.
-
-    Fields are floats where all polls are alike (coasting, at rest) and arrays of shape (polls,) otherwise.
-    """
-
-    polls: int
-    rate_rad_s: float | Floats
-    force_x_m_s2: float | Floats
-    force_y_m_s2: float | Floats
-
-    def without_first(self, polls: int) -> "Felt":
-        """The same without its first polls."""
-        rate, x, y = (
-            value if isinstance(value, float) else value[polls:]
-            for value in (self.rate_rad_s, self.force_x_m_s2, self.force_y_m_s2)
-        )
-        return Felt(self.polls - polls, rate, x, y)
-
-
-def last_polls(felt: list[Felt], polls: int) -> list[Felt]:
-    """The last polls of what was felt: a block that restarts misses those before."""
-    surplus = sum(part.polls for part in felt) - polls
-    while surplus > 0:
-        first = felt[0]
-        dropped = min(surplus, first.polls)
-        felt = felt[1:] if dropped == first.polls else [first.without_first(dropped), *felt[1:]]
-        surplus -= dropped
-    return felt
 
 
 class PollGrid:

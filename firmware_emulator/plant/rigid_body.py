@@ -8,8 +8,6 @@ beyond the middle heading (4e-6 of the force at 1 rad/s), the change of drag and
 
 import math
 
-import numpy as np
-
 from firmware_emulator.plant.air_table import FloorPulses, Surface
 from firmware_emulator.plant.body import Body, DryFriction, Push
 from firmware_emulator.plant.motion_state import Felt, Motion, PollGrid
@@ -59,10 +57,10 @@ class Vehicle:
         self._friction = DryFriction(friction_landed, body)
         self._polls = polls
         self._poll = polls.last_poll(start_ns)
-        self._ramp = np.arange(16, dtype=np.float64)
         self._float_change_ns = FAR_FUTURE_NS
         self._float_wanted = is_floating
         self._pushes: list[Push] = []
+        self._hand = (0.0, 0.0, 0.0)
         self._slope_at = (math.inf, math.inf)
         self._slope = (0.0, 0.0)
         self._felt: list[Felt] = []
@@ -77,6 +75,13 @@ class Vehicle:
         """Give the centre of mass an impulse (table frame) spread evenly over a duration from now."""
         force = NS_PER_S / duration_ns
         self._pushes.append(Push(impulse_x_n_s * force, impulse_y_n_s * force, self.now_ns + duration_ns))
+
+    def set_hand(self, force_x_n: float, force_y_n: float, torque_nm: float) -> None:
+        """Let a hand push from now on: force on the centre of mass (table frame) and torque; zeros end it.
+
+        A landed vehicle does not yield.
+        """
+        self._hand = (force_x_n, force_y_n, torque_nm)
 
     def advance(self, until_ns: int) -> None:
         """Move on to `until_ns`, which is not before now."""
@@ -106,7 +111,7 @@ class Vehicle:
         return self._glided((stamp_ns - self.now_ns) / NS_PER_S)[0].of_point(self._origin_from_com_m)
 
     def take_felt(self) -> list[Felt]:
-        """What the IMU felt at the polls since the last call, in order."""
+        """What the IMU felt at each poll since the last call, in order."""
         felt, self._felt = self._felt, []
         return felt
 
@@ -140,9 +145,9 @@ class Vehicle:
         return self._slope[0] + jerk_x, self._slope[1] + jerk_y
 
     def _pushed_acceleration(self) -> tuple[float, float]:
-        """By drag and bumpers, table frame: what the IMU feels beside the thrust."""
-        ax = -self.body.drag_n_s_m * self.motion.vx_m_s
-        ay = -self.body.drag_n_s_m * self.motion.vy_m_s
+        """By drag, hand and bumpers, table frame: what the IMU feels beside the thrust."""
+        ax = self._hand[0] - self.body.drag_n_s_m * self.motion.vx_m_s
+        ay = self._hand[1] - self.body.drag_n_s_m * self.motion.vy_m_s
         for push in self._pushes:
             ax += push.fx_n
             ay += push.fy_n
@@ -158,6 +163,9 @@ class Vehicle:
         rate = now.rate_rad_s + turn_rad_s2 * duration_s
         dvx, dvy = (push_x + glide_x) * duration_s, (push_y + glide_y) * duration_s
         dx, dy = 0.5 * dvx * duration_s, 0.5 * dvy * duration_s
+        if self._hand[2] != 0.0:
+            rate += self._hand[2] / body.inertia_kg_m2 * duration_s
+            heading += self._hand[2] / body.inertia_kg_m2 * 0.5 * duration_s * duration_s
         if not bank.is_quiet:
             rise_s = bank.timing.rise_s
             once_s = rise_s * -math.expm1(-duration_s / rise_s)  # integral of the decay
@@ -203,28 +211,29 @@ class Vehicle:
         bank, inertia = self.thrusters, self.body.inertia_kg_m2
         arm_x, arm_y = self._imu_from_com_m
         rate = self.motion.rate_rad_s
-        if bank.is_quiet:  # drag alone: alike within a piece
+        if bank.is_quiet and self._hand[2] == 0.0:  # drag alone: alike within a piece
             turn = -self.body.drag_nm_s * rate / inertia
             force_x = push_x - turn * arm_y - rate * rate * arm_x
             force_y = push_y + turn * arm_x - rate * rate * arm_y
-            self._felt.append(Felt(count, rate, force_x, force_y))
+            self._felt += [(rate, force_x, force_y)] * count
             return
-        if count > self._ramp.size:
-            self._ramp = np.arange(2 * count, dtype=np.float64)
         first_s = (self._polls.stamp_ns(first_poll + 1) - self.now_ns) / NS_PER_S
-        times_s = first_s + (self._polls.period_ns / NS_PER_S) * self._ramp[:count]
-        left = np.exp(times_s * (-1.0 / bank.timing.rise_s))
+        period_s = self._polls.period_ns / NS_PER_S
         fx, fy, torque = bank.target
         gx, gy, gtorque = bank.wrench[0] - fx, bank.wrench[1] - fy, bank.wrench[2] - torque
-        turns = (torque / inertia) + (gtorque / inertia) * left
-        rates = (rate + (torque / inertia) * times_s) + (gtorque / inertia * bank.timing.rise_s) * (
-            1.0 - left
-        )
-        squares = rates * rates
-        mass = self.body.mass_kg
-        forces_x = (push_x + fx / mass) + (gx / mass) * left - arm_y * turns - arm_x * squares
-        forces_y = (push_y + fy / mass) + (gy / mass) * left + arm_x * turns - arm_y * squares
-        self._felt.append(Felt(count, rates, forces_x, forces_y))
+        rise_s, mass = bank.timing.rise_s, self.body.mass_kg
+        turn_end, turn_excess = (torque + self._hand[2]) / inertia, gtorque / inertia
+        end_x, end_y = push_x + fx / mass, push_y + fy / mass
+        excess_x, excess_y = gx / mass, gy / mass
+        for poll in range(count):  # a piece has ten or so, for which arrays cost more than their sums
+            time_s = first_s + period_s * poll
+            left = math.exp(-time_s / rise_s)
+            turn = turn_end + turn_excess * left
+            rate_then = rate + turn_end * time_s + turn_excess * rise_s * (1.0 - left)
+            square = rate_then * rate_then
+            force_x = end_x + excess_x * left - arm_y * turn - arm_x * square
+            force_y = end_y + excess_y * left + arm_x * turn - arm_y * square
+            self._felt.append((rate_then, force_x, force_y))
 
     def _is_sliding(self) -> bool:
         return self.motion.vx_m_s != 0.0 or self.motion.vy_m_s != 0.0 or self.motion.rate_rad_s != 0.0
@@ -245,5 +254,5 @@ class Vehicle:
             square = now.rate_rad_s * now.rate_rad_s
             force_x = cosine * felt_x + sine * felt_y - square * arm_x
             force_y = cosine * felt_y - sine * felt_x - square * arm_y
-            self._felt.append(Felt(count, now.rate_rad_s, force_x, force_y))
+            self._felt += [(now.rate_rad_s, force_x, force_y)] * count
         self.thrusters.relax(duration_s)

@@ -9,8 +9,8 @@ events, and motion under it has a closed form.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,6 +59,25 @@ class GasSupply:
     tank_impulse_n_s: float = 300.0
 
 
+@dataclass(frozen=True, slots=True)
+class BankFailures:
+    """What is broken; valves by their index.
+
+    Attributes:
+        stuck_open: Valves that are open whatever their coils do.
+        stuck_closed: Valves that never open.
+        leaks: Share of its thrust that a closed valve loses.
+        thrust_left: Share of its thrust that an open valve gives.
+        tank_limit_pa: The tank's pressure is no higher.
+    """
+
+    stuck_open: frozenset[int] = frozenset()
+    stuck_closed: frozenset[int] = frozenset()
+    leaks: Mapping[int, float] = field(default_factory=dict)
+    thrust_left: Mapping[int, float] = field(default_factory=dict)
+    tank_limit_pa: float = math.inf
+
+
 class ThrusterBank:
     """All valves of one vehicle with their gas.
 
@@ -84,9 +103,7 @@ class ThrusterBank:
         self._closes_ns = [FAR_FUTURE_NS] * count  # mechanical closing of a valve that is or will be open
         self._is_open = [False] * count
         self._is_energised = [False] * count
-        self._leaks = [0.0] * count
-        self._stuck_open: set[int] = set()
-        self._stuck_closed: set[int] = set()
+        self._failures = BankFailures()
         self._next_event_ns = FAR_FUTURE_NS
         self._targets: dict[tuple[bool, ...], tuple[Wrench, float]] = {}
         self.wrench: Wrench = (0.0, 0.0, 0.0)
@@ -99,7 +116,8 @@ class ThrusterBank:
     @property
     def tank_pa(self) -> float:
         """Pressure left in the tank."""
-        return self._supply.tank_pa * max(0.0, 1.0 - self.used_impulse_n_s / self._supply.tank_impulse_n_s)
+        left = max(0.0, 1.0 - self.used_impulse_n_s / self._supply.tank_impulse_n_s)
+        return min(self._failures.tank_limit_pa, self._supply.tank_pa * left)
 
     @property
     def supply_pa(self) -> float:
@@ -138,10 +156,9 @@ class ThrusterBank:
             self._closes_ns[valve] = now_ns + round(self.timing.close_s * NS_PER_S)
         self._schedule()
 
-    def set_failures(self, stuck_open: set[int], stuck_closed: set[int], leaks: dict[int, float]) -> None:
-        """Replace the mechanical failures; `leaks` maps a valve to the fraction of thrust it loses closed."""
-        self._stuck_open, self._stuck_closed = set(stuck_open), set(stuck_closed)
-        self._leaks = [leaks.get(valve, 0.0) for valve in range(len(self._leaks))]
+    def set_failures(self, failures: BankFailures) -> None:
+        """Replace what is broken."""
+        self._failures = failures
         self._targets.clear()
         self._retarget()
 
@@ -190,11 +207,15 @@ class ThrusterBank:
         self._target_gas_n = gas_n * pressure
 
     def _target_of(self, is_open: tuple[bool, ...]) -> tuple[Wrench, float]:
+        failures = self._failures
         openings = [
-            1.0 if valve in self._stuck_open else 0.0 if valve in self._stuck_closed else float(opened)
+            1.0 if valve in failures.stuck_open else 0.0 if valve in failures.stuck_closed else float(opened)
             for valve, opened in enumerate(is_open)
         ]
-        openings = [max(opening, leak) for opening, leak in zip(openings, self._leaks, strict=True)]
+        openings = [
+            max(opening * failures.thrust_left.get(valve, 1.0), failures.leaks.get(valve, 0.0))
+            for valve, opening in enumerate(openings)
+        ]
         sag = self.timing.sag ** max(0.0, sum(openings) - 1.0)
         fx = fy = torque = gas_n = 0.0
         for opening, (dfx, dfy, dtorque), thrust_n in zip(

@@ -9,7 +9,7 @@ the names, the entries (``_ENTRY``), the causes (``_CAUSE``) and the payloads, o
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import NamedTuple
 
 from groundstation.bus.envelope import Cause, Envelope
@@ -105,8 +105,12 @@ class Recorded(NamedTuple):
     data: bytes
 
 
-def read_batch(data: bytes) -> Iterator[Recorded]:
+def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Recorded]:
     """Messages of a batch, in the order of their publication.
+
+    Args:
+        data: The batch.
+        nouns: Of the topics that are wanted; None for all.
 
     Raises:
         BatchError: The bytes are no batch, or are cut off; nothing is yielded then.
@@ -138,27 +142,27 @@ def read_batch(data: bytes) -> Iterator[Recorded]:
         if isinstance(error, BatchError):
             raise
         raise BatchError(f"a batch of the record stream is cut off ({error})") from error
-    return _messages(data, position, names, rows, [Cause(names[n], names[o], s) for n, o, s in causes])
+    wanted = [nouns is None or name in nouns for name in names]
+    return _messages(data, position, names, wanted, rows, causes)
 
 
 def _messages(
     data: bytes,
     position: int,
     names: list[str],
+    wanted: list[bool],
     rows: list[tuple[int, ...]],
-    causes: list[Cause],
+    causes: list[tuple[int, int, int]],
 ) -> Iterator[Recorded]:
+    made = tuple.__new__  # a third of the time of calling a named tuple
     first = 0
     for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, count in rows:
         last, stop = first + count, position + size
-        yield Recorded(
-            names[noun],
-            names[owner],
-            sequence,
-            publish_ns,
-            wall_ns,
-            cpu_ns,
-            tuple(causes[first:last]),
-            data[position:stop],
-        )
+        if wanted[noun]:
+            made_from = tuple([made(Cause, (names[n], names[o], at)) for n, o, at in causes[first:last]])
+            payload = data[position:stop]
+            yield made(
+                Recorded,
+                (names[noun], names[owner], sequence, publish_ns, wall_ns, cpu_ns, made_from, payload),
+            )
         first, position = last, stop

@@ -13,12 +13,13 @@ Latched topics are repeated by their publisher with the same sequence number.
 """
 
 import json
+import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import zenoh
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, Handler, RingChannel
 
 from groundstation.declarations.topic import Delivery, Topic
 
@@ -27,6 +28,8 @@ ALIVE = "alive"
 RECORD = "record"
 PACED = "/paced"
 LEASE_MS = 2000
+SUBSCRIBERS_KNOWN_NS = 1_000_000_000
+"""The hub reports subscribers within milliseconds of a publisher's declaration; on a busy machine, later."""
 
 T = TypeVar("T")
 Receive = Callable[[str, bytes, bytes], None]
@@ -75,27 +78,30 @@ def _direct(receive: Callable[[T], None]) -> "Callback[T]":
 
 
 class TopicPublisher:
-    """Publishes one topic of one owner on its own key, to whoever subscribes.
+    """Publishes one topic of one owner on its own key, to whoever subscribes."""
 
-    Attributes:
-        is_wanted: Whether somebody subscribes, or another process of the rig waits for it anyhow.
-    """
-
-    def __init__(self, session: zenoh.Session, key: str, topic: Topic, *, always: bool) -> None:
+    def __init__(self, session: zenoh.Session, key: str, topic: Topic) -> None:
         newest = topic.delivery is Delivery.NEWEST
+        priority = zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH
+        if topic.is_apart:
+            priority = zenoh.Priority.REAL_TIME
         self._publisher = session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.DROP if newest else zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.DATA_LOW if newest else zenoh.Priority.DATA_HIGH,
+            priority=priority,
             express=not newest,
         )
-        self.is_wanted = always
-        self._listener = None if always else self._publisher.declare_matching_listener(_direct(self._match))
-        if self._listener is not None and self._publisher.matching_status:
-            self.is_wanted = True
+        self._has_subscribers = False
+        self._known_ns = time.monotonic_ns() + SUBSCRIBERS_KNOWN_NS
+        self._listener = self._publisher.declare_matching_listener(_direct(self._match))
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody subscribes, or may subscribe: the hub has not had the time to report it."""
+        return self._has_subscribers or time.monotonic_ns() < self._known_ns
 
     def _match(self, status: zenoh.MatchingStatus) -> None:
-        self.is_wanted = status.matching
+        self._has_subscribers = status.matching
 
     def put(self, encoded: bytes, attachment: bytes) -> None:
         """Send one encoded payload."""
@@ -103,9 +109,25 @@ class TopicPublisher:
 
     def close(self) -> None:
         """Stop listening for subscribers."""
-        if self._listener is not None:
-            self._listener.undeclare()
-            self._listener = None
+        self._listener.undeclare()
+
+
+class Mailbox:
+    """What came under a key expression, kept by Zenoh until it is taken: no thread of Python runs for it.
+
+    Args:
+        handler: Drops its oldest sample when it is full.
+    """
+
+    def __init__(self, handler: "Handler[zenoh.Sample]") -> None:
+        self._handler = handler
+
+    def take(self) -> list[tuple[str, bytes]]:
+        """Keys and payloads of all that waits, in order of arrival."""
+        found = []
+        while (sample := self._handler.try_recv()) is not None:
+            found.append((str(sample.key_expr), sample.payload.to_bytes()))
+        return found
 
 
 class ZenohBus:
@@ -124,8 +146,9 @@ class ZenohBus:
         self._is_hub = is_hub
         self._session = open_hub(endpoint) if is_hub else zenoh.open(_config("client", connect=(endpoint,)))
         self._publishers: list[TopicPublisher] = []
+        self._at_once: dict[tuple[str, str], TopicPublisher] = {}
         self._record: zenoh.Publisher | None = None
-        self._subscribers: list[zenoh.Subscriber[None]] = []
+        self._subscribers: list[zenoh.Subscriber[Any]] = []
         self._token: zenoh.LivelinessToken | None = None
 
     def __enter__(self) -> Self:
@@ -136,20 +159,24 @@ class ZenohBus:
     ) -> None:
         self.close()
 
-    def publisher(
-        self, topic: Topic, owner: str, *, always: bool = False, paced: bool = False
-    ) -> TopicPublisher:
+    def publisher(self, topic: Topic, owner: str, *, paced: bool = False) -> TopicPublisher:
         """A publisher of a topic of an owner.
 
         Args:
             topic: The topic.
             owner: Vehicle or process, empty for the rig.
-            always: Publish whether or not a subscriber has been noticed: another process waits for it.
             paced: On the key of those who take it paced.
         """
-        made = TopicPublisher(self._session, key_of(topic, owner, paced=paced), topic, always=always)
+        made = TopicPublisher(self._session, key_of(topic, owner, paced=paced), topic)
         self._publishers.append(made)
         return made
+
+    def put(self, topic: Topic, owner: str, encoded: bytes, attachment: bytes) -> None:
+        """Publish one encoded payload at once, whether or not a subscriber has been noticed."""
+        publisher = self._at_once.get((topic.noun, owner))
+        if publisher is None:
+            publisher = self._at_once[topic.noun, owner] = self.publisher(topic, owner)
+        publisher.put(encoded, attachment)
 
     def publish_batch(self, process: str, batch: bytes) -> None:
         """Send a batch of the record stream; blocks while the hub does not take it."""
@@ -175,6 +202,12 @@ class ZenohBus:
 
         callback = Callback(take, indirect=self._is_hub)
         self._subscribers.append(self._session.declare_subscriber(key_expression, callback))
+
+    def collect(self, key_expression: str, most: int) -> Mailbox:
+        """Keep the newest ``most`` samples under a key expression for whoever takes them when he looks."""
+        subscriber = self._session.declare_subscriber(key_expression, RingChannel(most))
+        self._subscribers.append(subscriber)
+        return Mailbox(subscriber.handler)
 
     def announce(self, process: str) -> None:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""

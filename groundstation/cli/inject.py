@@ -23,6 +23,9 @@ def inject(
     for_s: Annotated[float, typer.Option("--for", help="How long, seconds.", min=0.001)] = 10.0,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1, max=3600)] = 3.0,
     pid: Annotated[int | None, typer.Option(help="Process of the run, where several are going on.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--as", help="In whose name; your user name if it is left out.")
+    ] = None,
 ) -> None:
     """Inject a failure into the emulated laboratory of a running rig, e.g. --valve 3.
 
@@ -37,7 +40,7 @@ def inject(
     except ArgumentError as error:
         raise UsageError(str(error)) from error
     run = choose_run(vehicle, pid)
-    ack = ask(run.endpoint, vehicle, action.name, given, getpass.getuser(), timeout)
+    ack = ask(run.endpoint, vehicle, action.name, given, name or getpass.getuser(), timeout)
     verdict = "accepted" if ack.accepted else f"refused: {ack.reason}"
     print(f"{vehicle} ({run.rig}): inject {failure} for {for_s:g} s: {verdict}")
     if not ack.accepted:

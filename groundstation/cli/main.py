@@ -22,10 +22,11 @@ COMMANDS: dict[str, Row] = {
     "recording": Command("groundstation.cli.recording:app", "Look into recordings, recover a torn one."),
     "report": Command("groundstation.cli.report:app", "Draw the figures of a recording."),
     "request": Command(
-        "groundstation.cli.request:app", "Ask something of a running vehicle: arm, stop, go_to."
+        "groundstation.cli.request:app", "Ask something of a running vehicle, or stop all: arm, stop, go_to."
     ),
     "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
+    "faults": Command("groundstation.cli.faults:app", "Show modes, what moves them, and every fault."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
@@ -40,6 +41,8 @@ ALIASES = {
     ("star-tracker", "overhead-pose"): ("calibrate", "overhead"),
 }
 """Spellings of before that go on working."""
+DEBUG = "GROUNDSTATION_DEBUG"
+"""Set in the environment, or by ``--debug`` on the line: an error's traceback comes before its sentence."""
 
 
 def spelled(words: list[str]) -> list[str]:
@@ -140,18 +143,29 @@ def call(words: list[str]) -> int:
     from groundstation.files.errors import FileError
     from groundstation.recording.errors import RecordingError
 
+    if "--debug" in words:
+        words = [word for word in words if word != "--debug"]
+        os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
         build(words)(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
-        sys.stderr.write(f"groundstation: {error}\n")
-        return 2
+        return _refuse(error, 2)
     except (GroundStationError, CoreError) as error:
-        sys.stderr.write(f"groundstation: {error}\n")
-        return 1
+        return _refuse(error, 1)
     return 0
+
+
+def _refuse(error: Exception, code: int) -> int:
+    """Write the sentence of an error of ours, after its traceback where that is asked for."""
+    if os.environ.get(DEBUG):
+        import traceback
+
+        traceback.print_exception(error)
+    sys.stderr.write(f"groundstation: {error}\n")
+    return code
 
 
 def main() -> None:

@@ -7,6 +7,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from groundstation.declarations.errors import RigError
+from groundstation.files.errors import FileError
 from groundstation.rig.overview import HEADINGS, as_markdown, overview
 from groundstation.rig.read import load_rig
 
@@ -24,7 +26,12 @@ def parts(
 
     Example: groundstation parts examples/rigs/overhead.toml
     """
-    view = overview(None if rig is None else load_rig(rig))
+    try:
+        view = overview(None if rig is None else load_rig(rig))
+    except FileError:
+        raise
+    except ValueError as error:  # a node refuses its configuration
+        raise RigError(f"{rig}: {error}") from error
     if markdown:
         print(as_markdown(view), end="")
         return

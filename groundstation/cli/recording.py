@@ -54,8 +54,8 @@ def recover(
         print(f"{file} had been finished properly")
     if found.torn_bytes:
         print(f"{found.torn_bytes} bytes at the torn end held no more messages")
-    if found.damaged_chunks:
-        print(f"{found.damaged_chunks} damaged chunks were left out")
+    for gap in found.gaps:
+        print(gap.sentence(found.start_ns))
     if found.orphans:
         print(f"{found.orphans} messages were left out: their channel stood in a damaged chunk")
 
@@ -119,6 +119,8 @@ def _print_info(found: Recording) -> None:
             microseconds=(found.start_ns + reported.utc_offset_ns) // 1000
         )
         print(f"start: {start:%Y-%m-%d %H:%M:%S} UTC")
+    for sentence in found.missing():
+        print(sentence)
     for name, digest in reported.calibration_sha256.items():
         print(f"calibration {name}: sha256 {digest[:16]}…")
     table = Table("topic", "of", "messages", "rate / Hz", box=None, pad_edge=False)

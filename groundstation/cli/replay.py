@@ -65,7 +65,7 @@ def _replay(
     found: Recording, nodes: list[str] | None, out: Path | None, rig_path: Path | None, allowed: Tolerances
 ) -> ReplayReport:
     info, rig = _rig_of(found, rig_path)
-    for sentence in changed_files(rig, found.info):
+    for sentence in (*found.missing(), *changed_files(rig, found.info)):
         print(sentence)
     if info.software not in ("", software()):
         print(
@@ -74,12 +74,14 @@ def _replay(
     output = None if out is None else Recorder(out, replace(info, software=software()))
     try:
         report = ReplayRunner(found, _factory(rig), nodes, allowed, output).run()
+        if output is not None:
+            output.finish()
     except BaseException:  # no partial output, not even on Ctrl-C
         if output is not None:
             output.discard()
         raise
     if output is not None:
-        print(f"replayed: {output.finish()}")
+        print(f"replayed: {output.path}")
     return report
 
 

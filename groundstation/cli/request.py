@@ -1,22 +1,31 @@
-"""``groundstation request``: ask something of a running vehicle."""
+"""``groundstation request``: ask something of a running vehicle, or of all."""
 
 import getpass
 import math
 import sys
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import typer
+from typer.core import TyperCommand
 
-from groundstation.declarations.errors import UsageError
-from groundstation.declarations.request import Action, Argument, ArgumentError
-from groundstation.launch.asking import ask
-from groundstation.launch.running import choose_run
-from groundstation.parts.table import installed_tables, own_tables
+from groundstation.declarations.errors import GroundStationError, UsageError
+from groundstation.declarations.request import Ack, Action, Argument, ArgumentError, Value
+from groundstation.launch.asking import ask_each, silence
+from groundstation.launch.running import RunningRig, choose_run, choose_runs
+from groundstation.launch.stop_button import EVERY, press_stop
+from groundstation.parts.supervision.actions import ACTIONS
 
 # "-0.2" is a number and no option
 _NUMBERS = {"ignore_unknown_options": True}
+
+ALL, STOP = "all", "stop"
+FOR_ALL = ("stop", "land", "release", "fly", "disarm", "float_off")
+"""Actions that all vehicles can be asked for at once."""
+OF_RIG = ("take_control", "give_control")
+"""Actions that concern the rig: asked for once, whatever vehicle is named."""
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -27,7 +36,9 @@ def _shown(argument: Argument) -> str:
 
 @cache
 def _actions() -> Mapping[str, Action]:
-    """All actions; a broken package costs its own ones only, since a stop must pass."""
+    """All actions; a broken package costs its own ones only."""
+    from groundstation.parts.table import installed_tables, own_tables  # half a second that a stop has not
+
     try:
         return installed_tables().actions
     except UsageError as error:
@@ -40,26 +51,39 @@ def _described() -> str:
     return "\n\n".join(" ".join([row.name, *map(_shown, row.arguments)]) + f": {row.summary}" for row in rows)
 
 
-@app.command(
-    context_settings=_NUMBERS,
-    epilog=f"Actions and their arguments:\n\n{_described()}",
-)
+class _WithActions(TyperCommand):
+    """Its help ends with the table of actions, which is read only then."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 types that typer keeps to itself
+        self.epilog = f"Actions and their arguments:\n\n{_described()}"
+        super().format_epilog(ctx, formatter)
+
+
+@app.command(context_settings=_NUMBERS, cls=_WithActions)
 def request(
-    vehicle: Annotated[str, typer.Argument(help="Name of the vehicle, as in the rig file.")],
+    vehicle: Annotated[str, typer.Argument(help="Name of the vehicle, as in the rig file; or all.")],
     action: Annotated[str, typer.Argument(help="What it is to do.")],
     arguments: Annotated[
         list[str] | None, typer.Argument(help="In their order, or as name=value; metres, and degrees.")
     ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the answer.", min=0.1, max=3600)] = 3.0,
     pid: Annotated[int | None, typer.Option(help="Process of the run, where several are going on.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--as", help="In whose name; your user name if it is left out.")
+    ] = None,
 ) -> None:
-    """Ask something of a running vehicle and print the answer.
+    """Ask something of a running vehicle, or of all, and print the answer.
+
+    A stop has a path of its own, and is repeated until every vehicle has taken it. All vehicles can be
+    asked to stop, land, release, fly, disarm or float_off.
 
     Exit code 0 if it was accepted, 1 if it was refused or nobody answered.
 
     Example: groundstation request alpha go_to 0.2 0.1 90
+
+    Example: groundstation request all stop
     """
-    actions = _actions()
+    actions = ACTIONS if action == STOP else _actions()  # a stop waits for no package, broken or not
     row = actions.get(action)
     if row is None:
         raise UsageError(f"there is no action {action!r} (there are {', '.join(actions)})")
@@ -68,23 +92,80 @@ def request(
         given = row.check(_values(row, words))
     except ArgumentError as error:
         raise UsageError(str(error)) from error
-    run = choose_run(vehicle, pid)
-    ack = ask(run.endpoint, vehicle, action, given, getpass.getuser(), timeout)
+    if vehicle == ALL and action not in (*FOR_ALL, *OF_RIG):
+        raise UsageError(f"{action} is asked of one vehicle; all can be asked to {', '.join(FOR_ALL)}")
+    runs = choose_runs(pid) if vehicle == ALL else [choose_run(vehicle, pid)]
+    author = name or getpass.getuser()
+
+    def work(run: RunningRig) -> list[_Answer]:
+        try:
+            if action == STOP:
+                return _stop(run, EVERY if vehicle == ALL else vehicle, author, timeout)
+            return _ask(run, vehicle, action, given, author, timeout)
+        except GroundStationError as error:
+            if len(runs) == 1:
+                raise
+            return [_Answer(name, str(error), False) for name in run.vehicles]
+
+    with ThreadPoolExecutor(len(runs)) as pool:  # no rig waits for another one
+        found = list(pool.map(work, runs))
+    answers = [(run, answer) for run, of_run in zip(runs, found, strict=True) for answer in of_run]
     asked = " ".join([action, *words])
-    verdict = "accepted" if ack.accepted else f"refused: {ack.reason}"
-    print(f"{vehicle} ({run.rig}): {asked}: {verdict}")
-    if not ack.accepted:
+    for run, answer in answers:
+        print(f"{answer.vehicle} ({run.rig}): {asked}: {answer.words}")
+    if not all(answer.is_well for _, answer in answers):
         raise typer.Exit(1)
+
+
+class _Answer(NamedTuple):
+    """What became of a request of one vehicle."""
+
+    vehicle: str
+    words: str
+    is_well: bool
+
+
+def _ask(
+    run: RunningRig, vehicle: str, action: str, given: Mapping[str, Value], author: str, timeout_s: float
+) -> list[_Answer]:
+    vehicles = run.vehicles if vehicle == ALL else (vehicle,)
+    if action in OF_RIG:
+        vehicles = ("",)
+    acks = ask_each(run.endpoint, vehicles, action, given, author, timeout_s)
+    if len(vehicles) == 1 and not acks:
+        raise GroundStationError(silence(vehicles[0], timeout_s))
+    return [_answer(name, acks.get(name), timeout_s) for name in vehicles]
+
+
+def _answer(vehicle: str, ack: Ack | None, timeout_s: float) -> _Answer:
+    if ack is None:
+        return _Answer(vehicle or ALL, f"no answer within {timeout_s:g} s", False)
+    return _Answer(vehicle or ALL, "accepted" if ack.accepted else f"refused: {ack.reason}", ack.accepted)
+
+
+def _stop(run: RunningRig, vehicle: str, author: str, timeout_s: float) -> list[_Answer]:
+    press = press_stop(run.endpoint, run.vehicles, vehicle, author, timeout_s)
+    answers = []
+    for name in run.vehicles:
+        ruling = press.stopped.get(name)
+        if ruling is not None:
+            answers.append(_Answer(name, f"accepted, it is {ruling.mode}", True))
+        elif name in press.waiting:
+            answers.append(
+                _Answer(name, f"NOT CONFIRMED within {timeout_s:g} s: go and cut its air by hand", False)
+            )
+    return answers
 
 
 def _values(row: Action, words: list[str]) -> dict[str, object]:
     """Arguments by name, SI, from words in order or as ``name=value``."""
     names = {_shown(argument): argument for argument in row.arguments}
     if not any("=" in word for word in words):
-        if len(words) != len(names):
+        least = sum(argument.default is None for argument in row.arguments)
+        if not least <= len(words) <= len(names):
             wanted = " ".join(names) or "no arguments"
             raise ArgumentError(f"{row.name} takes {wanted}, found {len(words)} words")
-        pairs = list(zip(names, words, strict=True))
+        pairs = list(zip(names, words, strict=False))
     else:
         pairs = [(name, value) for name, _, value in (word.partition("=") for word in words)]
     values: dict[str, object] = {}

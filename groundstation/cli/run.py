@@ -1,5 +1,6 @@
 """``groundstation run``: fly the vehicles of a rig, live or in lockstep."""
 
+import getpass
 import signal
 import sys
 import time
@@ -12,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from groundstation.cli.keys import HELP, Keys, stdin_descriptor
 from groundstation.cli.terminal_view import TerminalView
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
@@ -24,6 +26,8 @@ app = typer.Typer(rich_markup_mode=None)
 
 REFRESH_S = 0.25
 LINE_EVERY_S = 2.0
+LANDED_BY_FAULT = 1
+"""Exit code of a run in which a vehicle ended otherwise than it should."""
 
 
 @app.command()
@@ -42,6 +46,11 @@ def run(
 ) -> None:
     """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds.
 
+    On a terminal the space bar stops all vehicles, l lands them, q ends the run.
+
+    Exit code 0; 1 where a fault landed a vehicle, or the recording could not be written to the end; 2 where
+    the rig is wrong. What a person stops or lands is no fault.
+
     Example: groundstation run examples/rigs/two_mock_ups.toml
 
     Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
@@ -56,34 +65,45 @@ def run(
     if lockstep:
         if duration is None:
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
-        with _progress(duration) as update:
-            run_lockstep(loaded, text, rig, recording, duration, seed, update)
-    else:
-        if seed is not None:
-            raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
-        _run_live(
-            LiveRun(loaded, text, rig, recording), duration, headless=headless or not sys.stdout.isatty()
-        )
-    finished = _say_recordings(recording)
+    elif seed is not None:
+        raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
+    trouble = ""
+    try:
+        if lockstep:
+            assert duration is not None
+            with _progress(duration) as update:
+                faults = run_lockstep(loaded, text, rig, recording, duration, seed, update)
+        else:
+            live = LiveRun(loaded, text, rig, recording)
+            _run_live(live, duration, headless=headless or not sys.stdout.isatty())
+            faults, trouble = live.faults, live.launcher.recording_trouble
+    finally:
+        finished, torn = _say_recordings(recording)
+    for line in faults.lines():
+        print(line)
+    if trouble or (torn and not finished):
+        raise GroundStationError(trouble or f"no recording was finished: {torn[0]} is what is left")
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
         from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
 
         print_report(finished[-1], report)
+    if faults.brought_down:
+        raise typer.Exit(LANDED_BY_FAULT)
 
 
-def _say_recordings(recording: Path) -> list[Path]:
-    """Name the files of a run; a recorder that was started again left several. Returns the finished ones."""
+def _say_recordings(recording: Path) -> tuple[list[Path], list[Path]]:
+    """Name the files of a run; a recorder that was started again left several. Finished ones, and others."""
     every = [recording, *sorted(recording.parent.glob(f"{recording.stem}_[0-9]*{recording.suffix}*"))]
     torn = recording.with_name(recording.name + PART_SUFFIX)
     finished = [path for path in every if path.suffix == recording.suffix and path.exists()]
     for path in finished:
         print(f"recording: {path}")
-    for path in [torn, *every]:
-        if path.name.endswith(PART_SUFFIX) and path.exists():
-            print(f"not finished: {path} (groundstation recording recover brings back what it holds)")
-    return finished
+    left = [path for path in [torn, *every] if path.name.endswith(PART_SUFFIX) and path.exists()]
+    for path in left:
+        print(f"not finished: {path} (groundstation recording recover brings back what it holds)")
+    return finished, left
 
 
 class _Ending:
@@ -92,9 +112,10 @@ class _Ending:
     def __init__(self) -> None:
         self.asked = False
         for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(kind, self._ask)
+            signal.signal(kind, self.ask)
 
-    def _ask(self, number: int, frame: FrameType | None) -> None:
+    def ask(self, number: int = 0, frame: FrameType | None = None) -> None:
+        """Ask for the end."""
         del number, frame
         self.asked = True
 
@@ -107,12 +128,24 @@ def _run_live(live: LiveRun, duration: float | None, *, headless: bool) -> None:
         live.start(lambda: ending.asked)
         until_s = None
         next_line_s = 0.0
-        with view.opened(headless=headless):
+        keys = Keys(
+            stdin_descriptor(),
+            live.launcher.endpoint,
+            tuple(live.rig.vehicles),
+            getpass.getuser(),
+            live.monitor.note,
+            ending.ask,
+        )
+        if ending.asked:
+            return
+        with keys, view.opened(headless=headless, keys=HELP if keys.are_read else ""):
             while not ending.asked:
                 live.step(REFRESH_S)
                 now_s = time.monotonic()
-                if until_s is None and live.is_ready and duration is not None:
-                    until_s = now_s + duration
+                if until_s is None and duration is not None:
+                    live.check_start()
+                    if live.is_ready:
+                        until_s = now_s + duration
                 if until_s is not None and now_s >= until_s:
                     break
                 if not headless:

@@ -18,6 +18,7 @@ from rich.text import Text
 
 from groundstation.declarations.view import Cell, Level
 from groundstation.watch.ledger import STAGES
+from groundstation.watch.monitor import EVENTS_KEPT
 
 if TYPE_CHECKING:  # it brings the bus along
     from groundstation.launch.live_run import LiveRun
@@ -42,6 +43,11 @@ _STAGES = {
     "bytes_to_state": "IMU bytes to state",
 }
 _MOST_COLUMNS = 4  # of vehicles beside each other on 120 characters
+_LEAST_EVENTS, _MOST_EVENTS = 2, EVENTS_KEPT
+_LEAST_ROWS = 2  # of a vehicle: its mode and its faults
+_AROUND_ROWS = 4  # heading and rule, and the empty lines around
+_AROUND_EVENTS = 2  # the frame
+_WIDEST_LABEL = 24
 
 
 class TerminalView:
@@ -53,12 +59,22 @@ class TerminalView:
         self._live: Live | None = None
         self._waited_for = ""
         self._lower_shows: object = None
+        self._lower_lines = 0
         self._rendered = Segments([])
+        self._keys = ""
 
     @contextmanager
-    def opened(self, *, headless: bool) -> Iterator[None]:
-        """Keep the screen while the run lasts; the last picture stays."""
+    def opened(self, *, headless: bool, keys: str = "") -> Iterator[None]:
+        """Keep the screen while the run lasts; the last picture stays.
+
+        Args:
+            headless: Lines are written instead.
+            keys: What keys do; empty where none are read.
+        """
+        self._keys = keys
         if headless:
+            if keys:
+                self._run.monitor.note(f"keys: {keys}")
             yield
             return
         with Live(self._draw(), console=self._console, auto_refresh=False, screen=False) as live:
@@ -104,27 +120,42 @@ class TerminalView:
         title.add_column(justify="right", no_wrap=True)
         title.add_row(
             Text.assemble((run.rig.name, "bold"), "  ", status),
-            Text(f"{minutes}:{seconds:02d}   Ctrl-C ends", style=_DIM),
+            Text(f"{minutes}:{seconds:02d}", style=_DIM),
         )
-        events = Text("\n".join(run.monitor.lines) or "starting ...", no_wrap=True, overflow="ellipsis")
+        lower = self._lower()
+        blocks = math.ceil(len(run.monitor.vehicles) / _MOST_COLUMNS)
+        every = len(next(iter(run.monitor.vehicles.values())).labels())
+        room = self._console.height - 2 - _AROUND_EVENTS  # beside title and keys
+        rows = (room - _LEAST_EVENTS) // blocks - _AROUND_ROWS
+        rows = max(min(rows, every), _LEAST_ROWS)
+        room -= blocks * (rows + _AROUND_ROWS)
+        has_lower = room - self._lower_lines >= _LEAST_EVENTS
+        shown = room - self._lower_lines if has_lower else room
+        lines = list(run.monitor.lines)[-max(min(shown, _MOST_EVENTS), 1) :]
+        events = Text("\n".join(lines) or "starting ...", no_wrap=True, overflow="ellipsis")
+        keys = Text(self._keys or "Ctrl-C ends", style="bold" if self._keys else _DIM, no_wrap=True,
+                    overflow="ellipsis")  # fmt: skip
         return Group(
             title,
-            *self._vehicles(),
-            self._lower(),
+            *self._vehicles(rows),
+            *([lower] if has_lower else []),
             Panel(events, title="events", title_align="left", border_style=_DIM, padding=(0, 1)),
+            keys,
         )
 
-    def _vehicles(self) -> Iterator[Table]:
+    def _vehicles(self, most: int) -> Iterator[Table]:
+        """Tables of vehicles beside each other, the first rows of each."""
         now_ns = time.monotonic_ns()
         every = list(self._run.monitor.vehicles.items())
         for first in range(0, len(every), _MOST_COLUMNS):
             shown = every[first : first + _MOST_COLUMNS]
             table = Table(box=box.SIMPLE_HEAD, expand=True, padding=(0, 1), pad_edge=False)
-            table.add_column("", style=_DIM, no_wrap=True, width=24)
+            labels = shown[0][1].labels()[:most]
+            width = min(max(map(len, labels), default=0), _WIDEST_LABEL)
+            table.add_column("", style=_DIM, no_wrap=True, width=width)
             for name, _ in shown:
                 table.add_column(Text(name, style="bold"), no_wrap=True, ratio=1)
-            labels = shown[0][1].labels()
-            columns = [vehicle.rows(now_ns) for _, vehicle in shown]
+            columns = [vehicle.rows(now_ns)[:most] for _, vehicle in shown]
             for label, *cells in zip(labels, *columns, strict=True):
                 table.add_row(label, *map(text_of, cells))
             yield table
@@ -146,6 +177,7 @@ class TerminalView:
             lower.add_column(ratio=1)
             lower.add_row(self._ages(), self._processes(), self._ports())
             lines = self._console.render_lines(lower)
+            self._lower_lines = len(lines)
             self._rendered = Segments([piece for line in lines for piece in (*line, Segment.line())])
         return self._rendered
 

@@ -64,7 +64,10 @@ class Allocator:
         optimal = np.flatnonzero(miss <= max(_SLACK, float(miss.min()) + _SLACK))
         if sparse:
             used = (partial[optimal] > _SLACK).sum(axis=1) + self._fixed_count[optimal]
-            optimal = optimal[used.argmin() :][:1]
+            fewest = optimal[used.argmin()]
+            plan: NDArray[np.float64] = self._fixed[fewest].copy()
+            plan[self._basis[fewest]] = partial[fewest]
+            return plan.clip(0.0, 1.0)
         duties = self._fixed[optimal]
         duties[np.arange(len(optimal))[:, None], self._basis[optimal]] = partial[optimal]
         mean: NDArray[np.float64] = duties.sum(axis=0) / len(optimal)

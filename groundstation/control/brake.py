@@ -6,6 +6,7 @@ and no memory, only a fresh state.
 """
 
 import math
+from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -58,3 +59,25 @@ def brake_wrench(
     torque = vehicle.inertia_kg_m2 * config.damping_per_s * turning
     torque = min(torque, config.torque_share * envelope.max_torque_nm)
     return envelope.saturate(BodyWrench(against, -math.copysign(torque, state.rate_rad_s)))
+
+
+def dead_reckoned(
+    state: ControlState, wrench: BodyWrench, span_s: float, vehicle: VehicleModel
+) -> ControlState:
+    """The state after a wrench has acted for a while: what is left to brake on when no estimate comes.
+
+    Assumes a level table without friction and the valves' nominal thrust, so the speed that is left grows
+    uncertain by a tenth of what was braked away; good for a second or two.
+    """
+    middle_rad = state.heading_rad + 0.5 * state.rate_rad_s * span_s
+    force = rotate(wrench.force_body_n, middle_rad)
+    ax, ay = force[0] / vehicle.mass_kg, force[1] / vehicle.mass_kg
+    (x, y), (vx, vy) = state.position_table_m, state.velocity_table_m_s
+    turning = wrench.torque_nm / vehicle.inertia_kg_m2
+    return replace(
+        state,
+        position_table_m=(x + vx * span_s + 0.5 * ax * span_s**2, y + vy * span_s + 0.5 * ay * span_s**2),
+        velocity_table_m_s=(vx + ax * span_s, vy + ay * span_s),
+        heading_rad=state.heading_rad + state.rate_rad_s * span_s + 0.5 * turning * span_s**2,
+        rate_rad_s=state.rate_rad_s + turning * span_s,
+    )

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from groundstation.control.state import Vector2
 
@@ -20,6 +20,7 @@ class KeepIn:
     """
 
     corners_table_m: tuple[Vector2, ...]
+    _inward: tuple[tuple[Vector2, float], ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         corners = self.corners_table_m
@@ -33,12 +34,13 @@ class KeepIn:
                 raise ValueError(
                     f"a keep-in region must be convex and counter-clockwise; corner {corner} is not"
                 )
+        object.__setattr__(self, "_inward", tuple(_line(a, b) for a, b in self._edges()))
 
     def edge_distances_m(self, position_table_m: Vector2) -> list[float]:
         """Distance to each edge line, positive inside, in the order of the corners."""
         return [
             normal[0] * position_table_m[0] + normal[1] * position_table_m[1] + offset
-            for normal, offset in self.inward()
+            for normal, offset in self._inward
         ]
 
     def nearest_inside(self, position_table_m: Vector2) -> Vector2:
@@ -51,14 +53,9 @@ class KeepIn:
     def _edges(self) -> list[tuple[Vector2, Vector2]]:
         return list(itertools.pairwise((*self.corners_table_m, self.corners_table_m[0])))
 
-    def inward(self) -> list[tuple[Vector2, float]]:
+    def inward(self) -> tuple[tuple[Vector2, float], ...]:
         """Unit normal n and offset c of each edge: n . p + c is the distance inside."""
-        lines: list[tuple[Vector2, float]] = []
-        for a, b in self._edges():
-            length = math.dist(a, b)
-            normal = ((a[1] - b[1]) / length, (b[0] - a[0]) / length)
-            lines.append((normal, -normal[0] * a[0] - normal[1] * a[1]))
-        return lines
+        return self._inward
 
 
 def rectangle(
@@ -75,6 +72,12 @@ def rectangle(
     x, y = centre_table_m
     signs: Sequence[Vector2] = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
     return KeepIn(tuple((x + side_x * half_x, y + side_y * half_y) for side_x, side_y in signs))
+
+
+def _line(a: Vector2, b: Vector2) -> tuple[Vector2, float]:
+    length = math.dist(a, b)
+    normal = ((a[1] - b[1]) / length, (b[0] - a[0]) / length)
+    return normal, -normal[0] * a[0] - normal[1] * a[1]
 
 
 def _nearest_on(a: Vector2, b: Vector2, point: Vector2) -> Vector2:

@@ -1,9 +1,8 @@
-"""Who may command the valves: stop > brake > operator > controller, each only while it is fresh.
+"""Who may command the valves: brake > operator > controller, each only while it is fresh.
 
 Ages are judged by arrival stamps against the stamp of the question, never by stamps inside messages. Silence
-of the controller brakes, for closed valves on a frictionless table mean coasting; braking needs a fresh
-state, so without one all valves close. A stop is latched: it ends by an explicit release only, not by growing
-old.
+of the controller brakes, for closed valves on a frictionless table mean coasting; braking needs a state,
+carried on by the model for a while where none comes, so without one all valves close.
 """
 
 import enum
@@ -19,7 +18,6 @@ NS_PER_S = 1_000_000_000
 class Source(enum.Enum):
     """Whose demand goes to the valves."""
 
-    STOP = "stop"
     BRAKE = "brake"
     OPERATOR = "operator"
     CONTROLLER = "controller"
@@ -27,14 +25,19 @@ class Source(enum.Enum):
 
 
 class MuxConfig(BaseModel):
-    """How long each input stays fresh; from its rate: about three periods."""
+    """How long each input stays fresh; from its rate: about three periods.
+
+    Attributes:
+        operator_s: The operator's demands.
+        controller_s: The controller's.
+        state_s: A state to brake on; longer than a controller may fly by, for the brake law carries it on.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    brake_s: float = Field(default=0.3, gt=0.0)
     operator_s: float = Field(default=0.3, gt=0.0)
     controller_s: float = Field(default=0.3, gt=0.0)
-    state_s: float = Field(default=0.1, gt=0.0)
+    state_s: float = Field(default=2.0, gt=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Selection(Generic[Demand]):
     """The answer: for operator and controller their demand, else None.
 
     Attributes:
-        source: STOP and CLOSED: close all valves (STOP also disarms); BRAKE: use the brake law.
+        source: CLOSED: close all valves; BRAKE: use the brake law.
         demand: What the source asked for.
         is_new: The demand was not selected before; an old one is only refreshed, not started again.
         reason: Why this source, in words for the log and the console.
@@ -59,7 +62,6 @@ class CommandMux(Generic[Demand]):
 
     def __init__(self, config: MuxConfig) -> None:
         self._lifetime_ns = {
-            Source.BRAKE: round(config.brake_s * NS_PER_S),
             Source.OPERATOR: round(config.operator_s * NS_PER_S),
             Source.CONTROLLER: round(config.controller_s * NS_PER_S),
         }
@@ -67,23 +69,7 @@ class CommandMux(Generic[Demand]):
         self._arrival_ns: dict[Source, int] = {}
         self._demands: dict[Source, Demand] = {}
         self._unused: set[Source] = set()
-        self._reasons: dict[Source, str] = {}
         self._state_arrival_ns: int | None = None
-        self._stop_reason: str | None = None
-
-    def stop(self, reason: str) -> None:
-        """Close and stay closed until `release_stop`."""
-        self._stop_reason = reason
-
-    def release_stop(self) -> None:
-        """End a stop; demands that arrived before do not come back to life."""
-        self._stop_reason = None
-        self._arrival_ns.clear()
-
-    def brake(self, arrival_ns: int, reason: str) -> None:
-        """Ask for braking; to be repeated as long as it is wanted."""
-        self._arrival_ns[Source.BRAKE] = arrival_ns
-        self._reasons[Source.BRAKE] = reason
 
     def operate(self, demand: Demand, arrival_ns: int) -> None:
         """Take a demand of the operator; to be repeated as long as it is wanted."""
@@ -93,24 +79,25 @@ class CommandMux(Generic[Demand]):
         """Take a demand of the controller."""
         self._offer(Source.CONTROLLER, demand, arrival_ns)
 
+    def forget(self) -> None:
+        """Forget demands: those that were made before valves may open do not come to life then."""
+        self._arrival_ns.clear()
+
     def receive_state(self, arrival_ns: int) -> None:
         """Note that a state estimate arrived."""
         self._state_arrival_ns = arrival_ns
 
     def select(self, stamp_ns: int) -> Selection[Demand]:
         """Who commands at this moment, and why."""
-        if self._stop_reason is not None:
-            return Selection(Source.STOP, None, False, f"stop: {self._stop_reason}")
-        if self._is_fresh(Source.BRAKE, stamp_ns):
-            return self._brake_or_close(stamp_ns, f"brake: {self._reasons[Source.BRAKE]}")
         for source in (Source.OPERATOR, Source.CONTROLLER):
             if self._is_fresh(source, stamp_ns):
                 is_new = source in self._unused
                 self._unused.discard(source)
                 return Selection(source, self._demands[source], is_new, f"{source.value} is fresh")
-        return self._brake_or_close(stamp_ns, self._silence(stamp_ns))
+        return self.brake(stamp_ns, self._silence(stamp_ns))
 
-    def _brake_or_close(self, stamp_ns: int, reason: str) -> Selection[Demand]:
+    def brake(self, stamp_ns: int, reason: str) -> Selection[Demand]:
+        """Brake while there is a state to brake on; else all valves close."""
         if self._state_arrival_ns is None:
             return Selection(Source.CLOSED, None, False, f"{reason}; no state ever arrived to brake with")
         age_ns = stamp_ns - self._state_arrival_ns

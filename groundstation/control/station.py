@@ -10,7 +10,6 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.allocation import Allocator
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.gains import lqr_gains
 from groundstation.control.observer import DisturbanceObserver
@@ -25,6 +24,7 @@ from groundstation.control.state import (
     rotate,
 )
 from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
 LONGEST_SPAN_S = 1.0  # after a longer gap the observer takes the measurement as it is
@@ -63,7 +63,7 @@ class StationKeeping:
     def __init__(self, config: StationConfig, vehicle: VehicleModel) -> None:
         self._config = config
         self._vehicle = vehicle
-        self._envelope = Allocator(vehicle).envelope
+        self._envelope = WrenchEnvelope(vehicle)
         self._gains = lqr_gains(config.position_error_m, config.acceleration_m_s2)
         self._heading_gains = lqr_gains(
             math.radians(config.heading_error_deg), math.radians(config.angular_acceleration_deg_s2)

@@ -1,4 +1,4 @@
-"""What the valves did to the mock-up over any span of the last second, by the commands they were given."""
+"""What the valves did to the mock-up over any span of the near past, by the commands they were given."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -17,10 +17,14 @@ class ValvePush:
         model: Where the valves push.
         open_delay_s: From a command to thrust.
         close_delay_s: From the end of an on-time to none.
+        kept_ns: How long pulses that ended are remembered.
     """
 
-    def __init__(self, model: VehicleModel, open_delay_s: float, close_delay_s: float) -> None:
+    def __init__(
+        self, model: VehicleModel, open_delay_s: float, close_delay_s: float, kept_ns: int = KEPT_NS
+    ) -> None:
         self._columns = [tuple(column) for column in model.effectiveness().T.tolist()]
+        self._kept_ns = kept_ns
         self._open_ns, self._close_ns = round(open_delay_s * 1e9), round(close_delay_s * 1e9)
         self._pulse_id: int | None = None
         self._pulses: deque[tuple[int, list[int]]] = deque()  # valve, [start, end) of its thrust
@@ -38,7 +42,7 @@ class ValvePush:
                 if self._is_open(valve, now_ns):
                     span[0] = now_ns + self._close_ns  # it never closed in between
                 self._pulses.append((valve, span))
-        while self._pulses and self._pulses[0][1][1] < now_ns - KEPT_NS:
+        while self._pulses and self._pulses[0][1][1] < now_ns - self._kept_ns:
             self._pulses.popleft()
 
     def mean(self, start_ns: int, stop_ns: int) -> BodyWrench:
@@ -52,13 +56,21 @@ class ValvePush:
         if not self._pulses:
             return NO_WRENCH
         fx = fy = torque = 0.0
-        for valve, (begin, end) in self._pulses:
-            overlap = min(end, stop_ns) - max(begin, start_ns)
-            if overlap > 0:
-                share = overlap / (stop_ns - start_ns)
-                x, y, turn = self._columns[valve]
-                fx, fy, torque = fx + share * x, fy + share * y, torque + share * turn
+        for valve, share in self.open_shares(start_ns, stop_ns):
+            x, y, turn = self._columns[valve]
+            fx, fy, torque = fx + share * x, fy + share * y, torque + share * turn
         return BodyWrench((fx, fy), torque)
+
+    def open_shares(self, start_ns: int, stop_ns: int) -> list[tuple[int, float]]:
+        """Pieces of thrust in a span that is not empty, as commanded: valve, and share of the span (0 to 1).
+
+        A valve whose thrust ended and began again within the span has two.
+        """
+        return [
+            (valve, (min(end, stop_ns) - max(begin, start_ns)) / (stop_ns - start_ns))
+            for valve, (begin, end) in self._pulses
+            if end > start_ns and begin < stop_ns and end > begin
+        ]
 
     def _is_open(self, valve: int, now_ns: int) -> bool:
         return any(each == valve and begin <= now_ns < end for each, (begin, end) in self._pulses)

@@ -72,7 +72,7 @@ def _facets(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
         if length <= _PARALLEL * float(np.linalg.norm(first) * np.linalg.norm(second)):
             continue
         for candidate in (normal / length, -normal / length):
-            if not any(np.allclose(candidate, known, atol=_PARALLEL) for known in normals):
+            if not normals or not np.isclose(normals, candidate, atol=_PARALLEL).all(axis=1).any():
                 normals.append(candidate)
     if not normals:
         raise ValueError("the valves all push along one line: no plane motion can be controlled with them")

@@ -3,7 +3,7 @@
 GroundStationError
     UsageError   something the user gave is wrong: one sentence, exit code 2
         RigError     the rig file
-    DeviceGone   a device of the rig cannot be opened or went away
+    NodeError    a node raised what it must not, or published what it does not declare
 """
 
 
@@ -17,3 +17,7 @@ class UsageError(GroundStationError):
 
 class RigError(UsageError):
     """The rig file is wrong."""
+
+
+class NodeError(GroundStationError):
+    """A node raised something, or published what is not among its outputs; the text names it."""

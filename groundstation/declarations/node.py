@@ -124,7 +124,7 @@ class NodeRow:
         """The process of the node: the rig's word, or the row's."""
         section = rig.nodes.get(self.name)
         template = section.process if section is not None else None
-        if not template:
+        if template is None:
             template = self.process if isinstance(self.process, str) else self.process(rig, vehicle)
         return template.replace("{vehicle}", vehicle)
 

@@ -36,6 +36,7 @@ class Part:
         check: Refuses a rig with a ValueError that begins with the key.
         gauges: Its rows of the live view.
         figures: Its numbers in the report.
+        package: Installed package that it comes from; empty for the tree's own, filled in when it is loaded.
     """
 
     name: str
@@ -51,3 +52,9 @@ class Part:
     check: Callable[[Rig], None] = nothing_to_check
     gauges: tuple[GaugeRow, ...] = ()
     figures: tuple[Callable[[], Figure], ...] = ()
+    package: str = ""
+
+    @property
+    def title(self) -> str:
+        """As sentences name it."""
+        return f"the part {self.name!r}" + (f" of the package {self.package}" if self.package else "")

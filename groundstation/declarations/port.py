@@ -57,11 +57,13 @@ class Port(ABC):
         reads: Class of the payloads that come in here.
         delivery: Whether a slow process sees every item or only the newest.
         is_optional: A laboratory without that channel is no mistake.
+        is_first: What it reads first is delivered before anything else, in real time.
     """
 
     reads: ClassVar[type[Message]]
     delivery: ClassVar[Delivery] = Delivery.EVERY
     is_optional: ClassVar[bool] = False
+    is_first: ClassVar[bool] = False
 
     channel: str
     vehicle: str

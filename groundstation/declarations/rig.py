@@ -16,8 +16,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 from groundstation.control.keep_in import KeepIn, rectangle
+from groundstation.declarations.names import PATTERN
 from groundstation.declarations.rig_file import RigFile
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, Positive, Section, Sigma
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.files.errors import FileError
 from groundstation.fusion.levelling import levelling
@@ -29,9 +30,11 @@ if TYPE_CHECKING:
 
 LABORATORY = "laboratory:"
 """Addresses that begin so are resolved by what the emulated laboratory announces."""
+STATION = "station:"
+"""Addresses that begin so are the launcher's to resolve; there are none in virtual time."""
 MOCK_UP_RADIUS_M = 0.2  # a mock-up keeps this far from the edge of the table
 
-VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+VehicleName = Annotated[str, Field(pattern=f"^{PATTERN}$")]
 
 S = TypeVar("S", bound=Section)
 
@@ -50,8 +53,8 @@ class TableSection(Section):
     y_max_m: float
     map: RigFile | None = None
     legs: dict[str, tuple[float, float]] = Field(default_factory=dict)
-    slope_sigma_m_s2: Positive | None = None
-    waviness_sigma_m_s2: Positive | None = None
+    slope_sigma_m_s2: Sigma | None = None
+    waviness_sigma_m_s2: Sigma | None = None
     waviness_length_m: Positive | None = None
 
     @model_validator(mode="after")
@@ -130,8 +133,8 @@ class NodeSection(Section):
     """
 
     process: str | None = None
-    busy_s: NonNegative = 0.0
-    late_s: NonNegative = 0.0
+    busy_s: Delay = 0.0
+    late_s: Delay = 0.0
 
     @model_validator(mode="after")
     def _either(self) -> Self:

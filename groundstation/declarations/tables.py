@@ -1,8 +1,10 @@
 """The tables of the whole system: the concatenation of what the parts declare, each name once."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from typing import TypeVar
 
+from groundstation.declarations.checks import wrong_in, wrong_inputs
 from groundstation.declarations.fix import FixSource
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import NodeRow
@@ -11,10 +13,12 @@ from groundstation.declarations.port import PortRow
 from groundstation.declarations.request import Action
 
 T = TypeVar("T")
+STANDARD_PACKAGES = ("std_msgs/", "geometry_msgs/", "sensor_msgs/", "nav_msgs/")
+"""Of ROS 2: their types have one layout, whichever class writes it."""
 
 
 class PartError(ValueError):
-    """Two parts declare the same name, or a part names what no part declares."""
+    """Two parts declare the same name, or a part declares what nobody could run."""
 
 
 class Tables:
@@ -33,11 +37,13 @@ class Tables:
         fix_sources: Rows by name, the first that a vehicle has being its default.
 
     Raises:
-        PartError: A name stands twice, or a row names an unknown node.
+        PartError: A name stands twice, a row names an unknown node, or a part declares what nobody could run.
     """
 
     def __init__(self, parts: Iterable[Part], topics: Iterable[type[Message]] = ()) -> None:
         listed = tuple(parts)
+        for part in listed:
+            _refuse(part, wrong_in(part))
         self.parts: Mapping[str, Part] = _by_name("part", ((part.name, part, part) for part in listed))
         own = ((kind.TOPIC.noun, kind, None) for kind in topics)
         declared = ((kind.TOPIC.noun, kind, part) for part in listed for kind in part.topics)
@@ -55,15 +61,52 @@ class Tables:
         for port in self.ports:
             if port.node not in self.nodes:
                 raise PartError(f"a port is read by a node {port.node!r}, which no part declares")
+        self._check_classes()
         for action in self.actions.values():
             if action.answered_by not in self.nodes:
                 raise PartError(
                     f"action {action.name!r} is answered by {action.answered_by!r}, which no part declares"
                 )
 
+    def part_of(self, row: NodeRow | PortRow) -> Part:
+        """The part that declares a row."""
+        return next(part for part in self.parts.values() if row in part.nodes or row in part.ports)
+
+    def _check_classes(self) -> None:
+        """What classes of nodes and ports take and give is declared; of those imported later, later."""
+        payloads = self.payloads.values()
+        for row in self.nodes.values():
+            if not isinstance(row.kind, str):
+                wrong = wrong_inputs(row.kind, payloads)
+                _refuse(self.part_of(row), wrong and f"node {row.name!r} {wrong}")
+        for port in self.ports:
+            reads = getattr(port.kind, "reads", None)
+            if reads not in payloads:
+                wrong = (
+                    f"the port of node {port.node!r} reads {reads!r:.80}, which no part declares as a topic"
+                )
+                _refuse(self.part_of(port), wrong)
+        types: dict[str, type[Message]] = {}
+        for kind in payloads:
+            first = types.setdefault(kind.ROS_TYPE, kind)
+            if not kind.ROS_TYPE.startswith(STANDARD_PACKAGES) and _layout(first) != _layout(kind):
+                raise PartError(
+                    f"the topics {first.TOPIC.noun!r} and {kind.TOPIC.noun!r} both have the ROS_TYPE "
+                    f"{kind.ROS_TYPE!r} with different fields"
+                )
+
     def owner(self, payload: type[Message]) -> str:
         """Name of the part that declares a payload class; empty for those of the runners."""
         return next((part.name for part in self.parts.values() if payload in part.topics), "")
+
+
+def _layout(kind: type[Message]) -> list[tuple[str, object]]:
+    return [(field.name, field.type) for field in fields(kind)]
+
+
+def _refuse(part: Part, wrong: str) -> None:
+    if wrong:
+        raise PartError(f"{part.title}: {wrong}")
 
 
 def _by_name(what: str, rows: Iterable[tuple[str, T, Part | None]]) -> dict[str, T]:

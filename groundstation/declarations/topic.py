@@ -57,6 +57,7 @@ class Topic:
         recorded: Recording policy.
         pace_ns: Nodes that take the topic paced receive the first message of each period of this length of
             the publisher's clock; 0 where none may.
+        is_apart: It comes by a session of its own and waits behind nothing.
     """
 
     noun: str
@@ -68,6 +69,7 @@ class Topic:
     observers_only: bool = False
     recorded: Recorded = Recorded.ALWAYS
     pace_ns: int = 0
+    is_apart: bool = False
 
 
 class Pace:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from groundstation.control.vehicle import VehicleModel, square_of_eight
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, Positive, Section
 
 
 class ValvesSection(Section):
@@ -12,9 +12,9 @@ class ValvesSection(Section):
     thrust_n: Positive = 0.22
     arm_m: Positive = 0.15
     min_on_s: Positive = 0.010
-    open_delay_s: NonNegative = 0.006
-    close_delay_s: NonNegative = 0.005
-    rise_s: NonNegative = 0.004
+    open_delay_s: Delay = 0.006
+    close_delay_s: Delay = 0.005
+    rise_s: Delay = 0.004
     period_s: Positive = 0.1
     max_open_s: Positive = 2.0
 

@@ -1,9 +1,11 @@
-"""One request to a running rig, and its answer."""
+"""Requests to a running rig, and their answers."""
 
+import itertools
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 import zenoh
 
@@ -13,7 +15,57 @@ from groundstation.bus.listener import Listener
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request, Value
+
+_SEQUENCE = itertools.count(1)
+"""Of all that this process publishes: a replay tells its messages apart by it."""
+
+
+def operator() -> str:
+    """What this process is called on the bus: a process of its own, as the recording sees it."""
+    return f"operator_{os.getpid()}"
+
+
+def fresh_number() -> int:
+    """A number that is unique per author: milliseconds of the monotonic clock, 32 bit."""
+    return time.monotonic_ns() // 1_000_000 % 2**32
+
+
+@contextmanager
+def session_with(endpoint: str) -> Iterator[ZenohBus]:
+    """A session with the hub of a run.
+
+    Raises:
+        GroundStationError: The hub is not there, or goes away.
+    """
+    try:
+        with ZenohBus(endpoint) as bus:
+            yield bus
+    except zenoh.ZError as error:
+        raise GroundStationError(f"the rig at {endpoint} does not let us in: {error}") from error
+
+
+def publish(bus: ZenohBus, message: Message) -> None:
+    """Publish a message of this process at once, and to the recorder."""
+    topic = message.TOPIC
+    envelope = Envelope(topic, operator(), next(_SEQUENCE), time.monotonic_ns())
+    encoded = codec_of(type(message)).encode(message)
+    bus.put(topic, operator(), encoded, envelope.attachment())
+    batch = RecordWriter()
+    batch.add(envelope, encoded)
+    bus.publish_batch(operator(), batch.take())
+
+
+def requests_of(
+    vehicles: tuple[str, ...], action: str, arguments: Mapping[str, Value], author: str
+) -> list[Request]:
+    """The same request of several vehicles, each with a number of its own."""
+    now_ns, first, text = time.monotonic_ns(), fresh_number(), json.dumps(dict(arguments))
+    return [
+        Request(now_ns, vehicle, (first + place) % 2**32, author, action, text)
+        for place, vehicle in enumerate(vehicles)
+    ]
 
 
 def ask(
@@ -32,32 +84,46 @@ def ask(
     Raises:
         GroundStationError: The hub is not there, or nobody answers in time.
     """
-    now_ns = time.monotonic_ns()
-    number = now_ns // 1_000_000 % 2**32  # unique per author
-    request = Request(now_ns, vehicle, number, author, action, json.dumps(dict(arguments)))
-    process = f"operator_{os.getpid()}"  # a process of its own, as the recording sees it
-    try:
-        with ZenohBus(endpoint) as bus:
-            acks = Listener(bus, (Ack,))
-            envelope = Envelope(Request.TOPIC, process, 1, now_ns)
-            encoded = codec_of(Request).encode(request)
-            batch = RecordWriter()
-            batch.add(envelope, encoded)
-            bus.publish_batch(process, batch.take())
-            bus.publisher(Request.TOPIC, process, always=True).put(encoded, envelope.attachment())
-            return _wait(acks, request, timeout_s)
-    except zenoh.ZError as error:
-        raise GroundStationError(f"the rig at {endpoint} does not let us in: {error}") from error
+    answers = ask_each(endpoint, (vehicle,), action, arguments, author, timeout_s)
+    ack = answers.get(vehicle)
+    if ack is None:
+        raise GroundStationError(silence(vehicle, timeout_s))
+    return ack
 
 
-def _wait(acks: Listener, request: Request, timeout_s: float) -> Ack:
-    until_s = time.monotonic() + timeout_s
-    asked = (request.request_id, request.author, request.vehicle)
-    while (left_s := until_s - time.monotonic()) > 0:
-        delivered = acks.take(left_s)
-        if delivered is None or not isinstance(delivered.payload, Ack):
-            continue
-        ack = delivered.payload
-        if (ack.request_id, ack.author, ack.vehicle) == asked:
-            return ack
-    raise GroundStationError(f"{request.vehicle} did not answer within {timeout_s:g} s: is it starting?")
+def ask_each(
+    endpoint: str,
+    vehicles: tuple[str, ...],
+    action: str,
+    arguments: Mapping[str, Value],
+    author: str,
+    timeout_s: float,
+) -> dict[str, Ack]:
+    """Ask the same of several vehicles at once; the answers that came in time, by vehicle.
+
+    Raises:
+        GroundStationError: The hub is not there.
+    """
+    with session_with(endpoint) as bus:
+        acks = Listener(bus, (Ack,))
+        waiting = {
+            (request.request_id, request.author, request.vehicle): request
+            for request in requests_of(vehicles, action, arguments, author)
+        }
+        for request in waiting.values():
+            publish(bus, request)
+        answers: dict[str, Ack] = {}
+        until_s = time.monotonic() + timeout_s
+        while waiting and (left_s := until_s - time.monotonic()) > 0:
+            delivered = acks.take(left_s)
+            if delivered is None or not isinstance(delivered.payload, Ack):
+                continue
+            ack = delivered.payload
+            if waiting.pop((ack.request_id, ack.author, ack.vehicle), None) is not None:
+                answers[ack.vehicle] = ack
+        return answers
+
+
+def silence(vehicle: str, timeout_s: float) -> str:
+    """What is reported where nobody answers."""
+    return f"{vehicle or 'nobody'} did not answer within {timeout_s:g} s: is it starting?"

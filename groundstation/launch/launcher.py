@@ -19,18 +19,20 @@ import zenoh
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
+from groundstation.declarations.names import LABORATORY, RECORDER
 from groundstation.declarations.node import COMMANDS
-from groundstation.declarations.rig import Rig
+from groundstation.declarations.rig import STATION, Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
 from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.forking import share_one_arena
+from groundstation.launch.memory import forget, memory_folder
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
-from groundstation.rig.plan import RECORDER, processes_of
+from groundstation.launch.urgency import going_first
+from groundstation.rig.plan import processes_of
 from groundstation.rig.read import bytes_of
 
-LABORATORY = "laboratory"
 START_S = 30.0
 """A process that is not ready by then never will be."""
 HOPELESS = 4  # restarts of a process that was never ready
@@ -78,6 +80,7 @@ class Launcher:
         self._fork_server = ForkServer(("groundstation.launch.preload",))
         self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
+        self._memory = memory_folder(rig_path)
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
@@ -107,8 +110,14 @@ class Launcher:
         """Names of the processes that are not ready."""
         return [child.name for child in self.children if not child.is_ready]
 
+    @property
+    def recording_trouble(self) -> str:
+        """Why the recording could not be written to its end; known after ``close``, empty where it could."""
+        child = self._children.get(RECORDER)
+        return child.last_words if child is not None and child.code == process.TROUBLE else ""
+
     def received(self, name: str) -> None:
-        """Note a sign of life of a process: a batch of its record stream; called from the bus's thread."""
+        """Note a sign of life of a process: a batch of its record stream."""
         child = self._children.get(name)
         if child is not None:
             child.last_sign_s = self._time.now_s
@@ -230,11 +239,13 @@ class Launcher:
         for name in sorted(self._waiting):
             child = self._children[name]
             child.started_s = self._time.now_s
-            child.write(pickle.dumps(Go(dict(self._addresses))))
+            child.write(pickle.dumps(Go({**self._addresses, f"{STATION}memory": str(self._memory)})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
         self._addresses = None
+        if not laboratory.restarts:  # new mock-ups; one that is started again stands for the same ones
+            forget(self._memory)
         laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
 
     def close(self) -> None:
@@ -264,7 +275,8 @@ def _open_hub() -> tuple[str, ZenohBus]:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     try:
-        return endpoint, ZenohBus(endpoint, is_hub=True)
+        with going_first():  # its threads, which pass on everybody's messages
+            return endpoint, ZenohBus(endpoint, is_hub=True)
     except zenoh.ZError as error:  # somebody took the port in between
         raise GroundStationError(f"the hub cannot be opened at {endpoint}: {error}") from error
 

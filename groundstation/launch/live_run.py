@@ -1,7 +1,6 @@
 """A whole live run of a rig: launcher, monitor and latency; what the terminal view looks at."""
 
 import os
-import queue
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,16 +8,24 @@ from pathlib import Path
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
-from groundstation.bus.zenoh_bus import RECORD, split_key
+from groundstation.bus.zenoh_bus import RECORD, Mailbox, split_key
+from groundstation.declarations.errors import GroundStationError
+from groundstation.declarations.names import LAUNCHER
 from groundstation.declarations.rig import Rig
-from groundstation.launch.launcher import Launcher
+from groundstation.launch.launcher import START_S, Launcher
 from groundstation.launch.running import RunningRig
+from groundstation.launch.running_time import RunningTime
 from groundstation.parts.operation.messages import Latency
+from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.monitor import Monitor
 
 LATENCY_PERIOD_S = 1.0
 POLL_S = 0.05
-PROCESS = "launcher"
+MOST_BATCHES = 4096
+"""Of record streams, half a minute's; a launcher that is kept from looking for longer loses the oldest."""
+READY_S = 2 * START_S
+"""What is not ready by then never will be: the laboratory has its time, then its processes have theirs."""
+PROCESS = LAUNCHER
 """Whose record stream the latency is in."""
 
 
@@ -38,11 +45,13 @@ class LiveRun:
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
         self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
-        self._batches: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
+        self._batches: Mailbox | None = None
         self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
+        self._starting = RunningTime()
         self._announcement: Path | None = None
 
     @property
@@ -59,18 +68,29 @@ class LiveRun:
         self._announcement = run.announce()
         bus = self.launcher.bus
         assert bus is not None
-        bus.subscribe(f"{RECORD}/*", self._receive)
+        self._batches = bus.collect(f"{RECORD}/*", MOST_BATCHES)
 
     def step(self, duration_s: float) -> None:
         """Supervise and take what is published for a while."""
         until_s = time.monotonic() + duration_s
         while (now_s := time.monotonic()) < until_s:
+            self._take()
             self.launcher.supervise()
-            self._take(min(until_s, now_s + POLL_S))
             if now_s >= self._latency_due_s:
                 self._latency_due_s = now_s + LATENCY_PERIOD_S
                 self._publish_latency()
                 self.monitor.look(time.monotonic_ns())
+            time.sleep(min(POLL_S, max(until_s - time.monotonic(), 0.0)))  # all at once costs least
+
+    def check_start(self) -> None:
+        """Call where nobody watches who could end a run that does not get ready.
+
+        Raises:
+            GroundStationError: It is not ready in the time that the laboratory and the processes have.
+        """
+        if not self.is_ready and self._starting.step(time.monotonic()) > READY_S:
+            names = ", ".join(self.launcher.waiting_for)
+            raise GroundStationError(f"the rig is not ready after {READY_S:g} s: {names} did not start")
 
     def close(self) -> None:
         """End everything in good order."""
@@ -78,30 +98,25 @@ class LiveRun:
             self._announcement.unlink(missing_ok=True)
         self.launcher.close()
 
-    def _receive(self, key: str, batch: bytes, _attachment: bytes) -> None:
-        """A batch of a process, on Zenoh's thread."""
-        process = split_key(key)[1]
-        self.launcher.received(process)
-        self._batches.put((process, batch))
-
-    def _take(self, until_s: float) -> None:
-        """Let the monitor have what comes, until a moment of the monotonic clock."""
-        while (left_s := until_s - time.monotonic()) > 0:
-            try:
-                process, batch = self._batches.get(timeout=left_s)
-            except queue.Empty:
-                return
+    def _take(self) -> None:
+        """Let the monitor have what has come; each batch is a sign of life."""
+        if self._batches is None:
+            return
+        now_ns = time.monotonic_ns()
+        for key, batch in self._batches.take():
+            process = split_key(key)[1]
             if process == PROCESS:
                 continue
+            self.launcher.received(process)
             try:
-                entries = read_batch(batch)
+                entries = read_batch(batch, self.monitor.nouns)
             except BatchError as error:
                 self.monitor.note(f"{process}: {error}")
                 continue
-            now_ns = time.monotonic_ns()
             for entry in entries:
                 if not self._is_repeated(entry):
                     self.monitor.take(entry, now_ns)
+                    self.faults.take(entry)
 
     def _is_repeated(self, entry: Recorded) -> bool:
         """Whether it is a latched message that came before: publishers repeat them for late joiners."""

@@ -6,11 +6,13 @@ from pathlib import Path
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
+from groundstation.launch.recorder import in_a_sentence
 from groundstation.parts.operation.messages import Latency
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
 from groundstation.rig.provenance import recording_info
 from groundstation.runners.make_runner import make_runner, seed_of
+from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.ledger import Ledger
 
 Progress = Callable[[str, float], None]
@@ -47,29 +49,32 @@ def run_lockstep(
     duration_s: float,
     seed: int | None,
     progress: Progress,
-) -> None:
-    """Run a rig for ``duration_s`` of virtual time into a recording.
+) -> FaultSummary:
+    """Run a rig for ``duration_s`` of virtual time into a recording; return what went wrong.
 
     Raises:
-        UsageError: The rig cannot run in lockstep, or the recording cannot be written.
+        UsageError: The rig cannot run in lockstep, or the recording cannot be begun.
+        GroundStationError: The recording cannot be written any further.
     """
     try:
         seed = seed_of(rig, seed)
     except RigError as error:
         raise RigError(f"{rig_path}: {error}") from error
     info = recording_info(rig, rig_text, rig_path, seed, utc_offset_ns=None)
+    faults = FaultSummary(tuple(rig.vehicles), 0)
     try:
         recorder = Recorder(recording, info)
     except RecordingError as error:
         raise UsageError(str(error)) from error
     try:
-        runner = make_runner(rig, seed, [recorder.record, _LatencyReporter(tuple(rig.vehicles), recorder)])
+        reporter = _LatencyReporter(tuple(rig.vehicles), recorder)
+        runner = make_runner(rig, seed, [recorder.record, reporter, faults.take_delivered])
     except BaseException as error:
         recorder.discard()
         if isinstance(error, RigError):
             raise RigError(f"{rig_path}: {error}") from error
         raise
-    with recorder:
+    with in_a_sentence(recorder), recorder:
         try:
             runner.run(
                 round(duration_s * 1e9),
@@ -77,3 +82,4 @@ def run_lockstep(
             )
         finally:
             runner.close()
+    return faults

@@ -6,7 +6,9 @@ import pickle
 import signal
 import sys
 import threading
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 
 from drivers.errors import DeviceError
 from groundstation.bus.journal import JournalWriter
@@ -15,11 +17,12 @@ from groundstation.declarations.errors import GroundStationError, RigError, Usag
 from groundstation.files.errors import FileError
 from groundstation.launch.child import REFUSAL
 from groundstation.launch.orders import Go, Orders
+from groundstation.launch.urgency import go_first
 from groundstation.recording.policy import ImagePolicy
 from groundstation.rig.plan import gives_way, resolved_ports
 from groundstation.rig.read import parse_rig
 from groundstation.runners.live import LiveProcess
-from groundstation.runners.slot import Sequences
+from groundstation.runners.slot import Sequences, Slot
 from groundstation.runners.step import build_slots
 
 SWITCH_INTERVAL_S = 0.0005
@@ -55,6 +58,8 @@ def obey(work: Callable[[Orders], None], orders: Orders) -> None:
 
 
 def _end_with(error: Exception, code: int) -> int:
+    if os.environ.get("GROUNDSTATION_DEBUG"):
+        traceback.print_exception(error)
     sys.stderr.write(" ".join(str(error).split()) + "\n")
     return code
 
@@ -101,7 +106,11 @@ def run(orders: Orders) -> None:
     if go is None:
         return
     ports = resolved_ports(rig, orders.process, go.addresses)
-    with ZenohBus(orders.endpoint) as bus:
+    carries_stop = _has_topics_apart(slots)
+    if carries_stop:
+        go_first()  # before any session or port starts a thread
+    apart_session = ZenohBus(orders.endpoint) if carries_stop else nullcontext()
+    with ZenohBus(orders.endpoint) as bus, apart_session as apart:
         process = LiveProcess(
             orders.process,
             slots,
@@ -111,6 +120,13 @@ def run(orders: Orders) -> None:
             journal,
             sequences,
             images=ImagePolicy(rig.record.images),
+            apart=apart,
         )
         stop_when_asked(process.stop)
         process.run()
+
+
+def _has_topics_apart(slots: Iterable[Slot]) -> bool:
+    """Whether a node here receives or publishes what waits behind nothing: a stop."""
+    kinds = (kind for slot in slots for kind in (*slot.node.inputs, *slot.node.outputs))
+    return any(kind.TOPIC.is_apart for kind in kinds)

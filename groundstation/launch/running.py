@@ -91,6 +91,19 @@ def _lives(pid: int) -> bool:
     return True
 
 
+def choose_runs(pid: int | None) -> list[RunningRig]:
+    """Every run, or that of one process.
+
+    Raises:
+        UsageError: There is none.
+    """
+    runs = [run for run in find_running() if pid in (None, run.pid)]
+    if not runs:
+        whose = "" if pid is None else f" with process {pid}"
+        raise UsageError(f"no rig is running{whose}: start one with `groundstation run`")
+    return runs
+
+
 def choose_run(vehicle: str, pid: int | None) -> RunningRig:
     """The run that flies a vehicle.
 
@@ -101,12 +114,7 @@ def choose_run(vehicle: str, pid: int | None) -> RunningRig:
     Raises:
         UsageError: There is none, or more than one.
     """
-    runs = find_running()
-    if pid is not None:
-        runs = [run for run in runs if run.pid == pid]
-    if not runs:
-        whose = "" if pid is None else f" with process {pid}"
-        raise UsageError(f"no rig is running{whose}: start one with `groundstation run`")
+    runs = choose_runs(pid)
     fitting = [run for run in runs if vehicle in run.vehicles]
     if not fitting:
         known = ", ".join(name for run in runs for name in run.vehicles)

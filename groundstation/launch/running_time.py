@@ -12,7 +12,7 @@ class RunningTime:
     """Sums up the steps of a loop, each at most ``LONGEST_STEP_S``.
 
     Attributes:
-        now_s: Running time of the newest step; may be read by other threads.
+        now_s: Running time of the newest step.
     """
 
     def __init__(self) -> None:

@@ -3,6 +3,7 @@
 A package adds its own by an entry point of the group ``groundstation.parts``.
 """
 
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
@@ -12,6 +13,7 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.tables import PartError, Tables
 
 ENTRY_POINT_GROUP = "groundstation.parts"
+OUR_PACKAGE = "groundstation"
 
 
 @cache
@@ -43,9 +45,10 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
     from groundstation.parts.stars.part import PART as STARS
+    from groundstation.parts.supervision.part import PART as SUPERVISION
     from groundstation.parts.valves.part import PART as VALVES
 
-    return VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
+    return SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
 
 
 def _load(point: EntryPoint) -> Part:
@@ -57,4 +60,4 @@ def _load(point: EntryPoint) -> Part:
         raise UsageError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(part, Part):
         raise UsageError(f"{where} is a {type(part).__name__}, expected a Part")
-    return part
+    return part if package == OUR_PACKAGE else replace(part, package=package)

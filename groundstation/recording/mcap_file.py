@@ -35,6 +35,10 @@ _MESSAGE = struct.Struct("<BQHIQQ")
 _MESSAGE_HEAD = _MESSAGE.size - RECORD.size
 _CHUNK = struct.Struct("<BQQQQII4sQ")
 _INDEX = struct.Struct("<BQHI")
+_CHUNK_INDEX_BYTES = 128
+"""Of a chunk in the summary, beside ten for each of its channels."""
+_FIXED_SUMMARY_BYTES = 4096
+"""Statistics without channels, offsets and footer, generously."""
 _FOOTER_CRC = struct.Struct("<BQQQ")
 
 
@@ -53,6 +57,7 @@ class McapFile:
 
     def __init__(self, file: BinaryIO, profile: str, library: str) -> None:
         self._file = file
+        self._compress = zstandard.ZstdCompressor().compress
         self._parts: list[bytes] = []  # of the open chunk
         self._size = 0
         self._stamps_and_offsets: dict[int, list[int]] = {}  # of the open chunk, by channel
@@ -61,11 +66,20 @@ class McapFile:
         self._metadata: list[MetadataIndex] = []
         self._chunks: list[ChunkIndex] = []
         self._counts: dict[int, int] = {}
+        self._summary_bytes = _FIXED_SUMMARY_BYTES
         file.write(MAGIC + _packed(Header(profile, library)))
+
+    @property
+    def rest_bytes(self) -> int:
+        """At most so many bytes are still to be written if the file is finished now."""
+        indexes = 2 * _INDEX.size * len(self._stamps_and_offsets)
+        stamps = sum(8 * len(index) for index in self._stamps_and_offsets.values())
+        return self._summary_bytes + self._size + indexes + stamps + _CHUNK_INDEX_BYTES
 
     def add_metadata(self, name: str, entries: dict[str, str]) -> None:
         """Write a metadata record."""
         record = _packed(Metadata(name=name, metadata=entries))
+        self._summary_bytes += 64 + len(name)
         self._metadata.append(MetadataIndex(offset=self._file.tell(), length=len(record), name=name))
         self._file.write(record)
 
@@ -138,6 +152,7 @@ class McapFile:
         )
 
     def _add(self, record: bytes) -> None:
+        self._summary_bytes += len(record) + 16  # schemas and channels are in the summary once more
         self._parts.append(record)
         self._size += len(record)
         if self._size > CHUNK_BYTES:
@@ -147,7 +162,7 @@ class McapFile:
         if not self._stamps_and_offsets:
             return
         records = b"".join(self._parts)
-        packed = zstandard.compress(records)
+        packed = self._compress(records)
         low_ns = min(min(index[::2]) for index in self._stamps_and_offsets.values())
         high_ns = max(max(index[::2]) for index in self._stamps_and_offsets.values())
         start = self._file.tell()
@@ -180,6 +195,7 @@ class McapFile:
                 uncompressed_size=len(records),
             )
         )
+        self._summary_bytes += _CHUNK_INDEX_BYTES + 10 * len(offsets)
         self._parts.clear()
         self._stamps_and_offsets.clear()
         self._size = 0

@@ -24,6 +24,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.topic import Topic
 from groundstation.recording.channel_names import parse_channel
 from groundstation.recording.errors import RecordingError
+from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata
 from groundstation.recording.info import FORMAT, METADATA_NAME, RecordingInfo
 from groundstation.recording.records import (
     MESSAGE,
@@ -83,6 +84,7 @@ class Recording:
     Attributes:
         info: What the recording states about itself.
         channels: By noun, then by owner.
+        gaps: What a recovery left out of it.
         start_ns: First log time, 0 if empty.
         stop_ns: Last log time, 0 if empty.
 
@@ -98,7 +100,7 @@ class Recording:
         except OSError as error:
             raise RecordingError(f"{path} cannot be opened: {error.strerror}") from error
         try:
-            self._summary, self.info = self._open()
+            self._summary, self.info, self.gaps = self._open()
         except RecordingError:
             self._file.close()
             raise
@@ -115,6 +117,10 @@ class Recording:
                 self._known[number] = noun, owner, schema.data.decode(errors="replace")
                 found.append(RecordedChannel(noun, owner, counts.get(number, 0)))
         self.channels = tuple(sorted(found, key=lambda channel: (channel.noun, channel.owner)))
+
+    def missing(self) -> list[str]:
+        """What a recovery left out, a sentence for each gap."""
+        return [gap.sentence(self.start_ns) for gap in self.gaps]
 
     def has(self, kind: type[Message], owner: str) -> bool:
         """Whether anything of a class of payloads of this owner was recorded."""
@@ -200,7 +206,7 @@ class Recording:
     ) -> None:
         self.close()
 
-    def _open(self) -> tuple[Summary, RecordingInfo]:
+    def _open(self) -> tuple[Summary, RecordingInfo, tuple[Gap, ...]]:
         try:
             reader = SeekingReader(self._file)
         except _UNREADABLE as error:
@@ -215,7 +221,8 @@ class Recording:
         if summary is None:
             raise RecordingError(f"{self.path} has no index: try `groundstation recording recover`")
         try:
-            return summary, RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {"format": str(FORMAT)}))
+            info = RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {"format": str(FORMAT)}))
+            return summary, info, from_metadata(metadata.get(GAPS_NAME, {}))
         except RecordingError as error:
             raise RecordingError(f"{self.path}: {error}") from error
 

@@ -6,12 +6,13 @@ that its compressor had finished are unpacked too. A damaged chunk in the middle
 
 import mmap
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
 from groundstation.recording import records
 from groundstation.recording.errors import RecordingError
+from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata, to_metadata
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
 from groundstation.recording.software import software
@@ -27,6 +28,8 @@ class Recovery:
         damaged_chunks: Chunks, the torn one included, that could not be unpacked; their messages are lost.
         orphans: Messages lost because the name of their channel stood in a damaged chunk.
         was_finished: The file had been finished properly.
+        gaps: Where the damaged chunks stood; the new file states them, those of an earlier recovery included.
+        start_ns: First log time of the new file.
     """
 
     messages: int = 0
@@ -34,6 +37,8 @@ class Recovery:
     damaged_chunks: int = 0
     orphans: int = 0
     was_finished: bool = False
+    gaps: list[Gap] = field(default_factory=list)
+    start_ns: int = 0
 
 
 def recover(source: Path, target: Path) -> Recovery:
@@ -79,6 +84,8 @@ class _Copy:
             profile, _ = records.read_header(data[self._whole[0].start : self._whole[0].stop])
         self._writer = McapFile(out, profile, f"{software()} recover")
         self._found = Recovery()
+        self._left_out = 0
+        self._newest_ns: int | None = None
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
         self._new_schemas: dict[int, int] = {}
@@ -97,6 +104,9 @@ class _Copy:
         else:
             self._tail(data[end:])
         self._found.was_finished = data[-len(records.MAGIC) :] == records.MAGIC and len(whole) > 1
+        self._close_gap(None)
+        if self._found.gaps:
+            self._writer.add_metadata(GAPS_NAME, to_metadata(self._found.gaps))
         self._writer.finish()
         return self._found
 
@@ -108,9 +118,13 @@ class _Copy:
                     raise DamagedChunkError("a chunk is shorter than it says")
                 self._inside(chunk.unpack())
             except (ValueError, struct.error):
-                self._found.damaged_chunks += 1
+                self._leave_out()
         elif opcode == Opcode.METADATA:
-            self._writer.add_metadata(*records.read_metadata(content))
+            name, entries = records.read_metadata(content)
+            if name == GAPS_NAME:
+                self._found.gaps += from_metadata(entries)
+            else:
+                self._writer.add_metadata(name, entries)
         elif opcode == Opcode.MESSAGE:
             self._message(content)
 
@@ -123,7 +137,17 @@ class _Copy:
                 try:
                     self._inside(chunk.unpack_what_is_there())
                 except (ValueError, struct.error):
-                    self._found.damaged_chunks += 1
+                    self._leave_out()
+
+    def _leave_out(self) -> None:
+        """One more damaged chunk; those without a message between them are one gap."""
+        self._found.damaged_chunks += 1
+        self._left_out += 1
+
+    def _close_gap(self, before_ns: int | None) -> None:
+        if self._left_out:
+            self._found.gaps.append(Gap(self._left_out, self._newest_ns, before_ns))
+            self._left_out = 0
 
     def _inside(self, data: bytes) -> None:
         for opcode, start, stop in records.complete_records(data):
@@ -149,6 +173,10 @@ class _Copy:
                 self._found.orphans += 1
                 return
             channel = self._new_channels[number] = self._register(known)
+        self._close_gap(log_ns)
+        if self._newest_ns is None:
+            self._found.start_ns = log_ns
+        self._newest_ns = max(log_ns, self._newest_ns or 0)
         self._writer.add_message(channel, log_ns, content[records.MESSAGE.size :], publish_ns, sequence)
         self._found.messages += 1
 

@@ -8,12 +8,14 @@ Nothing here reads a clock, so that two equal runs in virtual time give equal by
 """
 
 import contextlib
+import io
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import TYPE_CHECKING, Self
 
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
@@ -26,6 +28,9 @@ from groundstation.recording.info import METADATA_NAME, RecordingInfo
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.policy import is_kept
 from groundstation.recording.software import software
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 PART_SUFFIX = ".part"
 FLUSH_PERIOD_NS = 250_000_000
@@ -66,14 +71,24 @@ class Recorder:
         self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
         self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
-        self._file: BinaryIO | None = _open_new(path, self.part_path)
+        self._file: io.BufferedWriter | None = _open_new(path, self.part_path)
         try:
             self._writer = McapFile(self._file, profile="ros2", library=software())
             self._writer.add_metadata(METADATA_NAME, info.to_metadata())
             self._file.flush()
-        except OSError:
-            self._abandon()  # nothing is in it that could be recovered
+        except RecordingError:
+            self.discard()  # nothing is in it that could be recovered
             raise
+
+    @property
+    def written_bytes(self) -> int:
+        """In the file so far; the open chunk is not."""
+        return 0 if self._file is None else self._file.tell()
+
+    @property
+    def rest_bytes(self) -> int:
+        """At most so many bytes are still to be written if the recording is finished now."""
+        return 0 if self._file is None else self._writer.rest_bytes
 
     def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
@@ -143,25 +158,20 @@ class Recorder:
         if self._file is not None:
             self._writer.finish()
             self._file.flush()
-            os.fsync(self._file.fileno())
-            self._file.close()
-            self._file = None
-            self.part_path.replace(self.path)
+            with on_disk(self.part_path):
+                os.fsync(self._file.fileno())
+                self._file.close()
+                self._file = None
+                self.part_path.replace(self.path)
         return self.path
 
     def discard(self) -> None:
         """Leave no file: for derived recordings whose making failed; does nothing after ``finish``."""
         if self._file is not None:
-            self._file.close()
+            with contextlib.suppress(RecordingError):  # what is still buffered is not wanted any more
+                self._file.close()
             self._file = None
-            self.part_path.unlink()
-
-    def _abandon(self) -> None:
-        """Remove a file that could not be begun; what is still buffered cannot be written either."""
-        with contextlib.suppress(OSError):
-            self.discard()
-        self._file = None
-        self.part_path.unlink(missing_ok=True)
+            self.part_path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self
@@ -183,7 +193,8 @@ class Recorder:
         self._flush_due_ns = None
         self._writer.flush()
         if self._durable and self._file is not None:
-            os.fsync(self._file.fileno())
+            with on_disk(self.part_path):
+                os.fsync(self._file.fileno())
 
     def _channel(self, kind: type[Message], owner: str) -> int | None:
         """Channel of a topic of an owner, registered at first use; None if the policy drops it."""
@@ -205,7 +216,28 @@ class Recorder:
         return self._writer.add_channel(channel_name(noun, owner), "cdr", schema)
 
 
-def _open_new(path: Path, part_path: Path) -> BinaryIO:
+class _File(io.FileIO):
+    """A file whose writing fails in a sentence."""
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        with on_disk(Path(str(self.name))):
+            return super().write(data)
+
+
+@contextmanager
+def on_disk(path: Path) -> Iterator[None]:
+    """Write to a disk.
+
+    Raises:
+        RecordingError: It is full, or gone.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written any further: {error.strerror or error}") from error
+
+
+def _open_new(path: Path, part_path: Path) -> io.BufferedWriter:
     if path.exists():
         raise RecordingError(f"{path} is already there: recordings are never overwritten")
     try:
@@ -214,6 +246,6 @@ def _open_new(path: Path, part_path: Path) -> BinaryIO:
             raise RecordingError(
                 f"{part_path} is left of a recording that was not finished: recover it or remove it first"
             )
-        return part_path.open("xb")
+        return io.BufferedWriter(_File(part_path, "x"))
     except OSError as error:
         raise RecordingError(f"{part_path} cannot be written: {error.strerror}") from error

@@ -3,14 +3,15 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from groundstation.declarations.calls import calling
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
-from groundstation.declarations.node import FLIGHT, Node
+from groundstation.declarations.node import FLIGHT
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.tables import Tables
 from groundstation.parts.table import installed_tables
-from groundstation.rig.plan import nodes_of, ports_of
+from groundstation.rig.plan import make_nodes, ports_of
 
 HEADINGS = ("part", "topic", "rate", "published by", "in process", "received by")
 RUNNER = "the runner"
@@ -106,7 +107,8 @@ def _declared(tables: Tables) -> Iterable[_Spot]:
     """Nodes and ports of all parts, by their classes."""
     homes = {}
     for row in tables.nodes.values():
-        kind = row.node_class()
+        with calling(tables.part_of(row).title, f"kind of node {row.name!r}"):
+            kind = row.node_class()
         template = row.process if isinstance(row.process, str) else FLIGHT
         homes[row.name] = template.replace("{vehicle}", "*")
         fixes = tuple(source.payload for source in tables.fix_sources.values())
@@ -118,8 +120,7 @@ def _declared(tables: Tables) -> Iterable[_Spot]:
 
 def _placed(rig: Rig) -> Iterable[_Spot]:
     """Nodes and ports of a rig; names of vehicles are left out, since all are alike."""
-    for row, vehicle, process in nodes_of(rig):
-        node: Node = row.make(rig, vehicle)
+    for (row, vehicle, process), node in make_nodes(rig):
         yield _Spot(row.name, _plain(process, vehicle), _nouns(node.inputs), _nouns(node.outputs))
     for port, process in ports_of(rig):
         channel = _plain(port.channel, port.vehicle)

@@ -1,17 +1,18 @@
 """Which process runs what, and where its ports are opened: read from the rig and the tables of its parts."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from groundstation.declarations.errors import RigError
+from groundstation.declarations.calls import calling
+from groundstation.declarations.checks import check_node
+from groundstation.declarations.errors import RigError, UsageError
+from groundstation.declarations.message import Message
+from groundstation.declarations.names import OF_THE_BUS, process_trouble
 from groundstation.declarations.node import COMMANDS, Node, NodeRow, Weight
 from groundstation.declarations.port import Port
-from groundstation.declarations.rig import LABORATORY, Rig
-
-RECORDER = "recorder"
-NOT_VEHICLES = frozenset({"rig", "record", "alive"})
-"""First words of keys on the bus that stand for something else than a vehicle."""
+from groundstation.declarations.rig import LABORATORY, STATION, Rig
+from groundstation.declarations.topic import Scope
 
 
 class Placed(NamedTuple):
@@ -36,11 +37,13 @@ class PlacedPort(NamedTuple):
 
 def nodes_of(rig: Rig, process: str | None = None) -> list[Placed]:
     """The nodes of a process, or of all processes if None, in the order of the tables."""
-    found = [
-        Placed(row, vehicle, row.home(rig, vehicle))
-        for row in rig.tables.nodes.values()
-        for vehicle in row.vehicles(rig)
-    ]
+    found = []
+    for row in rig.tables.nodes.values():
+        part = rig.tables.part_of(row)
+        with calling(part.title, f"condition of node {row.name!r}"):
+            vehicles = row.vehicles(rig)
+        with calling(part.title, f"process of node {row.name!r}"):
+            found += [Placed(row, vehicle, row.home(rig, vehicle)) for vehicle in vehicles]
     return found if process is None else [placed for placed in found if placed.process == process]
 
 
@@ -50,14 +53,23 @@ def ports_of(rig: Rig) -> list[PlacedPort]:
 
 
 def _ports(rig: Rig) -> Iterator[PlacedPort]:
+    homes: dict[str, dict[str, str]] = {}
+    for placed in nodes_of(rig):
+        homes.setdefault(placed.row.name, {})[placed.vehicle] = placed.process
     for row in rig.tables.ports:
-        node = rig.tables.nodes[row.node]
-        vehicles = [""] if row.is_of_rig else node.vehicles(rig)
-        for vehicle in vehicles:
-            port = row.make(rig, vehicle)
-            if port is not None:
-                readers = node.vehicles(rig)
-                yield PlacedPort(port, node.home(rig, vehicle if vehicle in readers else readers[0]))
+        title = rig.tables.part_of(row).title
+        where = f"the port of node {row.node!r}"
+        readers = homes.get(row.node, {})
+        for vehicle in [""] if row.is_of_rig else readers:
+            with calling(title, f"make of {where}"):
+                port = row.make(rig, vehicle)
+            if port is None:
+                continue
+            if not isinstance(port, Port) or not isinstance(port.channel, str):
+                raise RigError(f"{title}: {where} is made as {port!r:.80}, expected a Port with its channel")
+            if not readers:
+                raise RigError(f"{title}: {port.channel} is read by {row.node!r}, which no vehicle has")
+            yield PlacedPort(port, readers.get(vehicle) or next(iter(readers.values())))
 
 
 def make_node(rig: Rig, key: str) -> Node:
@@ -65,12 +77,62 @@ def make_node(rig: Rig, key: str) -> Node:
 
     Raises:
         KeyError: The rig has no such node.
+        UsageError: Its part makes what no runner could run.
     """
-    vehicle, _, name = key.rpartition("/")
-    row = rig.tables.nodes[name]
-    if vehicle not in row.vehicles(rig):
-        raise KeyError(key)
-    return row.make(rig, vehicle)
+    for placed in nodes_of(rig):
+        if placed.key == key:
+            return made(rig, placed)
+    raise KeyError(key)
+
+
+def made(rig: Rig, placed: Placed) -> Node:
+    """Build a node of the rig.
+
+    Raises:
+        UsageError: Its part makes what no runner could run.
+        ValueError: It refuses its configuration.
+    """
+    row, title, payloads = placed.row, rig.tables.part_of(placed.row).title, rig.tables.payloads.values()
+    with calling(title, f"make of node {row.name!r}"):
+        node = row.make(rig, placed.vehicle)
+        kind = row.node_class()  # where its module is named only, it has been imported by now
+    check_node(title, placed.key, node, payloads, rig.vehicles)
+    if not isinstance(node, kind):
+        raise UsageError(
+            f"{title}: node {placed.key!r} is a {type(node).__name__}, its row says {row.kind!r:.80}"
+        )
+    return node
+
+
+def make_nodes(rig: Rig, process: str | None = None) -> list[tuple[Placed, Node]]:
+    """Build the nodes of a process, or of all processes if None, in the order of the tables.
+
+    Raises:
+        UsageError: A part makes what no runner could run, or two publish the same topic of one owner.
+        ValueError: A node refuses its configuration.
+    """
+    found = [(placed, made(rig, placed)) for placed in nodes_of(rig, process)]
+    if process is None:
+        _check_publishers(rig, [(placed, node.outputs) for placed, node in found])
+    return found
+
+
+def _check_publishers(rig: Rig, nodes: Iterable[tuple[Placed, tuple[type[Message], ...]]]) -> None:
+    """Refuse two nodes, or a node and a port, that publish one topic of one vehicle or of the rig."""
+    first: dict[tuple[str, str], str] = {}
+    makers = [
+        (kind, placed.vehicle, f"node {placed.key!r} of {rig.tables.part_of(placed.row).title}")
+        for placed, outputs in nodes
+        for kind in dict.fromkeys(outputs)
+    ]
+    makers += [(port.reads, port.vehicle, f"port {port.channel!r}") for port, _ in ports_of(rig)]
+    for kind, vehicle, name in makers:
+        if kind.TOPIC.scope is Scope.PROCESS:
+            continue
+        owner = "" if kind.TOPIC.scope is Scope.RIG else vehicle
+        other = first.setdefault((kind.TOPIC.noun, owner), name)
+        if other != name:
+            raise UsageError(f"{other} and {name} both publish {kind.TOPIC.noun}: a topic has one publisher")
 
 
 def processes_of(rig: Rig) -> list[str]:
@@ -88,7 +150,9 @@ def check_plan(rig: Rig) -> None:
     """Refuse a rig whose nodes cannot be placed.
 
     Raises:
-        RigError: An unknown node, a heavy node together with an urgent one, a process named like a vehicle.
+        RigError: An unknown node, a heavy node together with an urgent one, a process that is named like a
+            vehicle or like one of the ground station's own.
+        UsageError: Two nodes publish the same topic of one owner.
     """
     known = rig.tables.nodes
     for name in rig.nodes:
@@ -103,10 +167,20 @@ def check_plan(rig: Rig) -> None:
             raise RigError(
                 f"process '{process}' holds {heavy}, which is heavy, beside {urgent}, which must not wait"
             )
+    for placed in nodes_of(rig):
+        trouble = process_trouble(placed.process)
+        if trouble:
+            given = rig.nodes.get(placed.row.name)
+            where = f"nodes.{placed.row.name}.process"
+            if given is None or given.process is None:
+                where = f"{rig.tables.part_of(placed.row).title}: the process of node {placed.row.name!r}"
+            raise RigError(f"{where}: {trouble}")
+    kinds = [(placed, placed.row.kind) for placed in nodes_of(rig)]
+    _check_publishers(rig, [(placed, kind.outputs) for placed, kind in kinds if not isinstance(kind, str)])
     clash = set(processes_of(rig)) & set(rig.vehicles)
     if clash:
         raise RigError(f"'{clash.pop()}' names both a vehicle and a process: choose another vehicle name")
-    taken = NOT_VEHICLES & set(rig.vehicles)
+    taken = OF_THE_BUS & set(rig.vehicles)
     if taken:
         raise RigError(f"'{min(taken)}' has a meaning on the bus: choose another vehicle name")
 
@@ -120,6 +194,8 @@ def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
     found = []
     for port, _ in ports_of(rig):
         address = port.address
+        if isinstance(address, str) and address.startswith(STATION):
+            continue
         if not isinstance(address, str) or not address.startswith(LABORATORY):
             raise RigError(f"{port.channel}: {address!r} is real hardware, which runs in real time only")
         channel = address.removeprefix(LABORATORY)
@@ -141,7 +217,9 @@ def resolved_ports(rig: Rig, process: str, addresses: Mapping[str, object]) -> l
         if home != process:
             continue
         address = port.address
-        if isinstance(address, str) and address.startswith(LABORATORY):
+        if isinstance(address, str) and address.startswith(STATION):
+            address = addresses[address]
+        elif isinstance(address, str) and address.startswith(LABORATORY):
             channel = address.removeprefix(LABORATORY)
             if port.is_optional and channel not in addresses:
                 continue

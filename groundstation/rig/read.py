@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from groundstation.declarations.calls import calling, in_one_line, shortened
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.declarations.rig_file import RigFile
@@ -67,8 +68,8 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
     """
     try:
         content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise RigError(f"{path}: is not valid TOML: {error}") from error
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and a number of thousands of digits
+        raise RigError(f"{path}: is not valid TOML: {in_one_line(str(error))}") from error
     return build_rig(content, path, files, tables)
 
 
@@ -99,16 +100,15 @@ def build_rig(
         rig = model.model_validate(content, context={"read_file": _Reader(path.parent, files, known or {})})
         _check_vehicles(rig)
         for part in model.tables.parts.values():
-            part.check(rig)
+            with calling(part.title, "check"):
+                part.check(rig)
         check_plan(rig)
     except FileError as error:
-        raise RigError(str(error)) from error
+        raise RigError(in_one_line(str(error))) from error
     except ValidationError as error:
         raise RigError(f"{path}: {_first_sentence(error)}") from error
-    except RigError:
-        raise
-    except ValueError as error:
-        raise RigError(f"{path}: {error}") from error
+    except (RigError, ValueError) as error:
+        raise RigError(f"{path}: {in_one_line(str(error))}") from error
     rig.keep_source(Source(content, path))
     return rig
 
@@ -210,5 +210,5 @@ def _first_sentence(error: ValidationError) -> str:
         return f"'{where}' is no known key (a typo?)"
     if first["type"] == "missing":
         return f"'{where}' is missing"
-    value = "" if first["type"] == "value_error" else f", found {first['input']!r}"
-    return f"{where + ': ' if where else ''}{message}{value}"
+    value = "" if first["type"] == "value_error" else f", found {shortened(repr(first['input']))}"
+    return in_one_line(f"{where + ': ' if where else ''}{message}{value}")

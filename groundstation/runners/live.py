@@ -2,7 +2,8 @@
 
 Threads only read devices or the bus and append to the queue; nodes run in the loop. Messages inside a process
 are delivered directly. On its own key a topic goes out at once, for the processes that subscribe to it; all
-that is published goes out once more in the record stream.
+that is published goes out once more in the record stream. What comes apart (a stop) has a session of its own
+and is taken before everything that waits; what ports keep (a memory) is delivered before anything else.
 """
 
 import heapq
@@ -58,6 +59,7 @@ class LiveProcess:
         sequences: Shared with the slots.
         images: What of the cameras is recorded.
         is_done: Asked after ticks; True ends the process.
+        apart: A session of its own for topics that come apart; None where none is received or published.
     """
 
     def __init__(
@@ -72,15 +74,17 @@ class LiveProcess:
         *,
         images: ImagePolicy,
         is_done: Callable[[], bool] = lambda: False,
+        apart: ZenohBus | None = None,
     ) -> None:
         self._process = process
         self._bus = bus
+        self._apart = apart
         self._payloads = payloads
         self._is_done = is_done
         self._decoder = Decoder(payloads)
         self._inbox = Inbox()
         self._stopping = threading.Event()
-        self._out = LiveOutlets(bus, process, images, self.stop)
+        self._out = LiveOutlets(bus, process, images, self.stop, apart)
         self._local: deque[Delivered] = deque()
         self._held: list[tuple[int, int, Delivered | Slot]] = []
         self._held_count = 0
@@ -104,10 +108,10 @@ class LiveProcess:
             self._end()
 
     def _run(self) -> None:
-        self._subscribe()
         now_ns = time.monotonic_ns()
         self._step.start(now_ns)
-        self._drain()
+        self._remember()
+        self._subscribe()
         for thread in self._threads.values():
             thread.start()
         self._bus.announce(self._process)
@@ -145,6 +149,15 @@ class LiveProcess:
 
     # -- in ---------------------------------------------------------------------------------------
 
+    def _remember(self) -> None:
+        """Deliver what was kept, so that nodes know it before anything else reaches them or leaves a port."""
+        self._drain()  # of their start, before what they publish then can replace what was kept
+        for thread in self._threads.values():
+            if thread.port.is_first:
+                for stamp_ns, data in thread.read_first():
+                    self._step.arrive(thread.port, stamp_ns, data, time.monotonic_ns())
+        self._drain()
+
     def _subscribe(self) -> None:
         made_here = {
             (kind.TOPIC.noun, slot.node.vehicle)
@@ -154,13 +167,18 @@ class LiveProcess:
         }
         ports = (thread.port for thread in self._threads.values())
         made_here |= {(port.reads.TOPIC.noun, port.vehicle) for port in ports}
-        keys = set()
+        keys, apart = set(), set()
         for noun, vehicle in self._step.received:
             topic = self._payloads[noun].TOPIC
-            if topic.scope is Scope.PROCESS:
+            if topic.is_apart and self._apart is not None:
+                apart.add(f"*/{noun}" if topic.scope is Scope.PROCESS else key_of(topic, vehicle))
+            elif topic.scope is Scope.PROCESS:
                 keys.add(f"*/{noun}")
             elif (noun, vehicle) not in made_here:
                 keys.add(key_of(topic, vehicle, paced=self._step.is_paced((noun, vehicle))))
+        if self._apart is not None:
+            for key in sorted(apart):
+                self._apart.subscribe(key, self._from_apart)
         for key in sorted(keys):
             self._bus.subscribe(key, self._from_bus)
         self._bus.watch(self._from_watch)
@@ -169,6 +187,9 @@ class LiveProcess:
         kind = self._payloads.get(split_key(key)[1])
         delivery = Delivery.EVERY if kind is None else kind.TOPIC.delivery
         self._inbox.put(key, Remote(key, payload, attachment), delivery)
+
+    def _from_apart(self, key: str, payload: bytes, attachment: bytes) -> None:
+        self._inbox.put_urgent(Remote(key, payload, attachment))
 
     def _from_watch(self, process: str, is_alive: bool) -> None:
         if not is_alive and process != self._process:
@@ -224,6 +245,9 @@ class LiveProcess:
         self._threads[port.channel].write(payload)
 
     def _send_and_keep(self, delivered: Delivered) -> None:
+        port = self._step.writer_of(delivered.payload)
+        if port is not None and port.is_first:  # kept before anybody can know of it; delivered later
+            self._threads[port.channel].write(delivered.payload)
         self._out.send(delivered)
         self._local.append(delivered)
 
@@ -267,6 +291,7 @@ class LiveProcess:
         now_ns = time.monotonic_ns()
         self._out.send(self._step.take_journal(now_ns))
         self._out.close(now_ns)
+        self._step.raise_what_stopping_raised()
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,16 @@
 
 import queue
 import threading
+from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from groundstation.bus.listener import Remote
 from groundstation.declarations.port import Port
 from groundstation.declarations.topic import Delivery
+
+MOST_URGENT = 256
+"""Presses of a stop that wait; so many are one press that is repeated, and the newest ones say it as well."""
 
 
 class FromPort(NamedTuple):
@@ -39,12 +43,16 @@ class Taken:
 
 
 class Inbox:
-    """One queue in order of arrival; of topics with newest delivery it holds one item each. Thread-safe."""
+    """One queue in order of arrival; of topics with newest delivery it holds one item each. Thread-safe.
+
+    What is urgent is taken before everything else that waits.
+    """
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[Remote | FromPort | Gone | _Newest | Exception | None] = (
             queue.SimpleQueue()
         )
+        self._urgent: deque[Remote] = deque(maxlen=MOST_URGENT)
         self._newest: dict[str, Taken] = {}
         self._lock = threading.Lock()
 
@@ -64,6 +72,11 @@ class Inbox:
         if waiting is None:
             self._queue.put(_Newest(key))
 
+    def put_urgent(self, item: Remote) -> None:
+        """Put before everything that waits, but behind what is as urgent; beyond a limit the oldest goes."""
+        self._urgent.append(item)
+        self.wake()
+
     def put_gone(self, process: str) -> None:
         """Append the end of a process, behind what came from it."""
         self._queue.put(Gone(process))
@@ -82,15 +95,21 @@ class Inbox:
         Raises:
             Exception: What a thread handed to ``fail``.
         """
+        urgent = self._take_urgent()
+        if urgent is not None:
+            return urgent
         try:
             item = self._queue.get(timeout=timeout_s) if timeout_s > 0 else self._queue.get_nowait()
         except queue.Empty:
             return None
         if item is None:
-            return None
+            return self._take_urgent()
         if isinstance(item, Exception):
             raise item
         if isinstance(item, _Newest):
             with self._lock:
                 return self._newest.pop(item.key)
         return Taken(item)
+
+    def _take_urgent(self) -> Taken | None:
+        return Taken(self._urgent.popleft()) if self._urgent else None

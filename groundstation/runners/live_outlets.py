@@ -48,10 +48,19 @@ class LiveOutlets:
         process: Its name.
         images: What of the cameras is recorded.
         on_loss: Called once when the hub is gone; nothing is sent after that.
+        apart: Session of the topics that come apart; None where none is published here.
     """
 
-    def __init__(self, bus: ZenohBus, process: str, images: ImagePolicy, on_loss: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        bus: ZenohBus,
+        process: str,
+        images: ImagePolicy,
+        on_loss: Callable[[], None],
+        apart: ZenohBus | None = None,
+    ) -> None:
         self._bus = bus
+        self._apart = apart
         self._images = images
         self._on_loss = on_loss
         self._outlets: dict[tuple[str, str], _Outlet] = {}
@@ -117,8 +126,9 @@ class LiveOutlets:
         self._sender.close()
 
     def _open(self, topic: Topic, owner: str, kind: type[Message]) -> _Outlet:
+        bus = self._apart if topic.is_apart and self._apart is not None else self._bus
         return _Outlet(
-            self._bus.publisher(topic, owner),
+            bus.publisher(topic, owner),
             self._bus.publisher(topic, owner, paced=True) if topic.pace_ns else None,
             Pace(topic.pace_ns),
             codec_of(kind).encode,

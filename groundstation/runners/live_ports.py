@@ -1,7 +1,7 @@
 """Keeps the real edges open: one reader thread per port, which retries with back-off and reports trouble."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from drivers.errors import DeviceError
 from groundstation.declarations.message import Message
@@ -38,6 +38,21 @@ class PortThread(threading.Thread):
         self._is_well = True
         self._wait_s = FIRST_RETRY_S
 
+    def read_first(self) -> Iterable[tuple[int, object]]:
+        """Open the port and read once, before the thread is started, which then goes on with it.
+
+        Returns:
+            What arrived, as (stamp_ns, data); nothing where the device cannot be opened, which is reported
+            and tried again by the thread.
+        """
+        try:
+            self._edge = self.port.open()
+            return tuple(self._edge.read())
+        except DeviceError as error:
+            self._release()
+            self._trouble(self.port.channel, ERROR, f"{self.port.channel}: {error}")
+            return ()
+
     def run(self) -> None:
         """Read until closed."""
         while not self._closing.is_set():
@@ -60,7 +75,9 @@ class PortThread(threading.Thread):
             self._wait_s = min(2 * self._wait_s, LAST_RETRY_S)
 
     def _read_on(self) -> None:
-        edge = self._edge = self.port.open()
+        edge = self._edge
+        if edge is None:
+            edge = self._edge = self.port.open()
         is_reported = self._is_well
         if is_reported:
             self._report_open()

@@ -117,19 +117,30 @@ class LockstepRunner:
         self._publish_journal(until_ns)
 
     def close(self) -> None:
-        """End in good order: nodes give their last messages, then the laboratory is released."""
-        if self._is_running:
-            self._is_running = False
-            for slot in self._step.slots:
-                self._step.stop(slot, self.now_ns)
-            while self._heap and self._heap[0][0] <= self.now_ns:
-                _, _, _, what = heapq.heappop(self._heap)
-                if isinstance(what, Delivered):
-                    for observe in self._observers:
-                        observe(what, self.now_ns)
-                    self._step.deliver(what, self.now_ns)
-            self._publish_journal(self.now_ns)
-        self._laboratory.close()
+        """End in good order: nodes give their last messages, then the laboratory is released.
+
+        Raises:
+            NodeError: A node raised something; the others have stopped.
+        """
+        try:
+            self._stop_nodes()
+        finally:
+            self._laboratory.close()
+
+    def _stop_nodes(self) -> None:
+        if not self._is_running:
+            return
+        self._is_running = False
+        for slot in self._step.slots:
+            self._step.stop(slot, self.now_ns)
+        while self._heap and self._heap[0][0] <= self.now_ns:
+            _, _, _, what = heapq.heappop(self._heap)
+            if isinstance(what, Delivered):
+                for observe in self._observers:
+                    observe(what, self.now_ns)
+                self._step.deliver(what, self.now_ns)
+        self._publish_journal(self.now_ns)
+        self._step.raise_what_stopping_raised()
 
     # -- what the step asks for -------------------------------------------------------------------
 

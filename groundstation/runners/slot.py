@@ -1,4 +1,7 @@
-"""A node in a runner: what it consumes and publishes is counted, journaled and timed, in every runner."""
+"""A node in a runner: what it consumes and publishes is counted, journaled and timed, in every runner.
+
+Whatever a node raises leaves its slot as a ``NodeError``, one sentence with its key.
+"""
 
 import time
 from collections.abc import Iterable
@@ -6,6 +9,8 @@ from dataclasses import dataclass, field
 
 from groundstation.bus.envelope import Cause, Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
+from groundstation.declarations.calls import node_error
+from groundstation.declarations.errors import NodeError
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.topic import Scope, Topic
@@ -60,6 +65,14 @@ class Timing:
     late_ns: int = 0
 
 
+class _Failed(Node):
+    """In the place of a node that raised something, while the others end in good order."""
+
+    def receive(self, message: Message, now_ns: int) -> Iterable[Message]:
+        del message, now_ns
+        return ()
+
+
 @dataclass(slots=True)
 class Slot:
     """One node with its place in a process.
@@ -74,6 +87,7 @@ class Slot:
         timing: Emulated duration.
         busy_until_ns: When a busy node is free again.
         waiting: What waits for a busy node.
+        has_failed: It raised something: it is called no more, not even to stop.
     """
 
     key: str
@@ -85,6 +99,7 @@ class Slot:
     timing: Timing = field(default_factory=Timing)
     busy_until_ns: int = 0
     waiting: list[Delivered] = field(default_factory=list)
+    has_failed: bool = False
     _newest: dict[tuple[str, str], Cause] = field(default_factory=dict)
     _streams: dict[tuple[type[Message], str], Stream] = field(default_factory=dict)
     _trigger: tuple[str, str] = ("", "")
@@ -97,7 +112,10 @@ class Slot:
     def start(self, now_ns: int) -> list[Delivered]:
         """Journal the start and collect what the node publishes first."""
         self.journal.note(Kind.START, self.key, "", self.process, 0, now_ns)
-        return self._wrap(self.node.start(now_ns), now_ns, None)
+        try:
+            return self._wrap(self.node.start(now_ns), now_ns, None)
+        except (Exception, SystemExit) as error:
+            raise self._failed(error) from error
 
     def receive(self, delivered: Delivered, now_ns: int) -> list[Delivered]:
         """Deliver one message; the outputs carry the stamps at which they are to be published."""
@@ -105,21 +123,35 @@ class Slot:
         noun = topic.noun
         cause = self._newest[noun, owner] = Cause(noun, owner, sequence)
         self.journal.note(Kind.INPUT, self.key, noun, owner, sequence, now_ns)
-        return self._wrap(self.node.receive(delivered.payload, now_ns), now_ns, cause)
+        try:
+            return self._wrap(self.node.receive(delivered.payload, now_ns), now_ns, cause)
+        except (Exception, SystemExit) as error:
+            raise self._failed(error) from error
 
     def tick(self, now_ns: int) -> list[Delivered]:
         """Let time pass; what is made then was triggered by the newest message of the node's trigger."""
         self.journal.note(Kind.TICK, self.key, "", self.process, 0, now_ns)
-        return self._wrap(self.node.tick(now_ns), now_ns, self._newest.get(self._trigger))
+        try:
+            return self._wrap(self.node.tick(now_ns), now_ns, self._newest.get(self._trigger))
+        except (Exception, SystemExit) as error:
+            raise self._failed(error) from error
 
     def stop(self, now_ns: int) -> list[Delivered]:
         """Collect the node's last messages."""
         self.journal.note(Kind.STOP, self.key, "", self.process, 0, now_ns)
-        return self._wrap(self.node.stop(now_ns), now_ns, None)
+        try:
+            return self._wrap(self.node.stop(now_ns), now_ns, None)
+        except (Exception, SystemExit) as error:
+            raise self._failed(error) from error
 
     def drop(self, envelope: Envelope, now_ns: int) -> None:
         """Journal that a newer message replaced this one before the node was free."""
         self.journal.note(Kind.DROP, self.key, envelope.topic.noun, envelope.owner, envelope.sequence, now_ns)
+
+    def _failed(self, error: BaseException) -> NodeError:
+        """The sentence about what the node did."""
+        kind, self.node, self.has_failed = type(self.node), _Failed(self.node.vehicle), True
+        return error if isinstance(error, NodeError) else node_error(self.key, kind, error)
 
     def _wrap(self, made: Iterable[Message], now_ns: int, trigger: Cause | None) -> list[Delivered]:
         wall_ns = cpu_ns = 0
@@ -147,7 +179,7 @@ class Slot:
         """Look up once where a kind of payload goes."""
         kind = type(payload)
         if kind not in self.node.outputs:
-            raise TypeError(f"{self.key} published {kind.__name__}, which is not among its outputs")
+            raise NodeError(f"{self.key} published {kind.__name__}, which is not among its outputs")
         stream = self.sequences.stream(kind.TOPIC, owner_of(kind.TOPIC, payload, self.process))
         self._streams[kind, payload.vehicle] = stream
         return stream

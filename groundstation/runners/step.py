@@ -9,12 +9,13 @@ from typing import Protocol
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.journal import Journal, JournalWriter, Kind
+from groundstation.declarations.errors import NodeError
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.port import Port
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Delivery, Pace, Scope
-from groundstation.rig.plan import nodes_of
+from groundstation.rig.plan import make_nodes
 from groundstation.runners.slot import Sequences, Slot, Timing, owner_of
 
 JOURNAL_PERIOD_NS = 100_000_000
@@ -62,13 +63,16 @@ class Step:
         self._journal = journal
         self._sequences = sequences
         self._transport = transport
+        self._trouble: NodeError | None = None
         self._receivers: dict[Address, list[Slot]] = {}
-        self._paces: dict[Address, dict[str, Pace]] = {}  # of the slots that take it paced, by their keys
+        self._takers: dict[
+            Address, list[tuple[Slot, Pace | None]]
+        ] = {}  # with the pace of who takes it paced
         for slot in slots:
             for kind, address in inputs_of(slot.node):
+                pace = Pace(kind.TOPIC.pace_ns) if kind in slot.node.paced else None
                 self._receivers.setdefault(address, []).append(slot)
-                if kind in slot.node.paced:
-                    self._paces.setdefault(address, {})[slot.key] = Pace(kind.TOPIC.pace_ns)
+                self._takers.setdefault(address, []).append((slot, pace))
         self._writers: dict[Address, Port] = {
             (kind.TOPIC.noun, vehicle): port for port in ports for kind, vehicle in port.writes()
         }
@@ -80,7 +84,11 @@ class Step:
 
     def is_paced(self, address: Address) -> bool:
         """Whether all who receive it here take it paced."""
-        return len(self._paces.get(address, ())) == len(self._receivers[address])
+        return all(pace is not None for _, pace in self._takers[address])
+
+    def writer_of(self, payload: Message) -> Port | None:
+        """The port that a message leaves through; None where it leaves through none."""
+        return self._writers.get((payload.TOPIC.noun, payload.vehicle))
 
     def start(self, now_ns: int) -> None:
         """Start every node."""
@@ -88,8 +96,22 @@ class Step:
             self._publish(slot.start(now_ns))
 
     def stop(self, slot: Slot, now_ns: int) -> None:
-        """Take a node's last messages."""
-        self._publish(slot.stop(now_ns))
+        """Take a node's last messages; what it raises is kept, so that the others are stopped too."""
+        is_first = not any(each.has_failed for each in self.slots)
+        try:
+            self._publish(slot.stop(now_ns))
+        except NodeError as error:
+            if is_first:  # later ones follow from the first, which has been raised
+                self._trouble = error
+
+    def raise_what_stopping_raised(self) -> None:
+        """Call once all nodes have been stopped.
+
+        Raises:
+            NodeError: One of them raised something, and nothing had failed before.
+        """
+        if self._trouble is not None:
+            raise self._trouble
 
     def tick(self, slot: Slot, now_ns: int) -> None:
         """Let time pass for a node."""
@@ -110,25 +132,15 @@ class Step:
     def deliver(self, delivered: Delivered, now_ns: int) -> None:
         """Give a published message to the port that it leaves through and to the nodes that receive it."""
         payload = delivered.payload
-        address = payload.TOPIC.noun, payload.vehicle
-        port = self._writers.get(address)
+        port = self.writer_of(payload)
         if port is not None:
             self._transport.write(port, payload, now_ns)
-        self.receive(delivered, now_ns)
+        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
 
     def receive(self, delivered: Delivered, now_ns: int) -> None:
         """Give a message of another process to the nodes that receive it."""
         payload = delivered.payload
-        address = payload.TOPIC.noun, payload.vehicle
-        paces = self._paces.get(address)
-        for slot in self._receivers.get(address, ()):
-            pace = None if paces is None else paces.get(slot.key)
-            if pace is not None and not pace.passes(delivered.envelope.publish_ns):
-                continue
-            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
-                self._hand_over(slot, delivered, now_ns)
-            else:
-                self._wait(slot, delivered, now_ns)
+        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
 
     def free(self, slot: Slot, now_ns: int) -> None:
         """A busy node is done: it takes what has waited longest."""
@@ -142,6 +154,15 @@ class Step:
         topic = Journal.TOPIC
         sequence = self._sequences.next(topic, self.process)
         return Delivered(Envelope(topic, self.process, sequence, now_ns), payload)
+
+    def _give(self, address: Address, delivered: Delivered, now_ns: int) -> None:
+        for slot, pace in self._takers.get(address, ()):
+            if pace is not None and not pace.passes(delivered.envelope.publish_ns):
+                continue
+            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
+                self._hand_over(slot, delivered, now_ns)
+            else:
+                self._wait(slot, delivered, now_ns)
 
     def _wait(self, slot: Slot, delivered: Delivered, now_ns: int) -> None:
         """Let a message wait for a busy node; of a topic with newest delivery only the last one waits."""
@@ -195,13 +216,13 @@ def build_slots(
 
     Raises:
         ValueError: A node refuses its configuration.
+        UsageError: A part makes a node that no runner could run.
     """
     slots = []
-    for row, vehicle, _ in nodes_of(rig, process):
+    for (row, vehicle, _), node in make_nodes(rig, process):
         section = rig.nodes.get(row.name)
         timing = Timing()
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
-        node = row.make(rig, vehicle)
         slots.append(Slot(row.key(vehicle), node, process or name, journal, sequences, measure, timing))
     return slots

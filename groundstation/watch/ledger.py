@@ -18,7 +18,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from groundstation.bus.cdr import CodecError, codec_of
+from groundstation.bus.cdr import CodecError, codec_of, stamp_of
 from groundstation.bus.envelope import Cause, Delivered
 from groundstation.bus.record_stream import Recorded
 from groundstation.declarations.message import Message
@@ -56,6 +56,7 @@ _PASSED_ON = {kind.TOPIC.noun: before.TOPIC.noun for kind, before in _BEFORE.ite
 FOLLOWED: Mapping[str, type[Message]] = {**_READ, **{kind.TOPIC.noun: kind for kind in _BEFORE}}
 """Classes that the ledger wants, by their nouns; it passes over all others."""
 
+_STAMPED = frozenset({ImuBytes.TOPIC.noun, StarSpots.TOPIC.noun})
 _SPOTS, _STATE = StarSpots.TOPIC.noun, VehicleState.TOPIC.noun
 _SAMPLES = 2000
 _ORIGINS = 16384
@@ -123,12 +124,15 @@ class Ledger:
                 Cause(noun, recorded.owner, recorded.sequence), recorded.publish_ns, recorded.causes
             )
         elif noun in _READ:
-            if payload is None:
-                try:
-                    payload = codec_of(_READ[noun]).decode(recorded.data)
-                except CodecError:
-                    return  # whoever shows messages counts these
             key = Cause(noun, recorded.owner, recorded.sequence)
+            try:
+                if noun in _STAMPED:
+                    self._read_stamp(key, recorded.publish_ns, stamp_of(recorded.data))
+                    return
+                if payload is None:
+                    payload = codec_of(_READ[noun]).decode(recorded.data)
+            except CodecError:
+                return  # whoever shows messages counts these
             self._read(key, recorded.publish_ns, recorded.causes, payload)
 
     def take_delivered(self, delivered: Delivered) -> None:
@@ -139,6 +143,8 @@ class Ledger:
             key = Cause(noun, envelope.owner, envelope.sequence)
             if noun in _PASSED_ON:
                 self._pass_on(key, envelope.publish_ns, envelope.causes)
+            elif noun in _STAMPED:
+                self._read_stamp(key, envelope.publish_ns, payload.stamp_ns)
             else:
                 self._read(key, envelope.publish_ns, envelope.causes, payload)
 
@@ -153,13 +159,16 @@ class Ledger:
             p99_s.append(high)
         return Latency(stamp_ns, vehicle, STAGES, tuple(p50_s), tuple(p99_s))
 
+    def _read_stamp(self, key: Cause, publish_ns: int, stamp_ns: int) -> None:
+        """A message of which nothing but the stamp, an arrival, is of interest."""
+        if key.noun == _SPOTS:  # its fix will name the exposure
+            self._await(key, _Link(key, publish_ns, stamp_ns))
+        else:
+            self._learn(key, stamp_ns)
+
     def _read(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...], payload: Message) -> None:
         """A message that states something of an origin."""
-        if isinstance(payload, ImuBytes):
-            self._learn(key, payload.stamp_ns)
-        elif isinstance(payload, StarSpots):  # its fix will name the exposure
-            self._await(key, _Link(key, publish_ns, payload.stamp_ns))
-        elif isinstance(payload, StarFix):
+        if isinstance(payload, StarFix):
             vehicle = self._vehicle(key.owner)
             vehicle.reach("exposure", payload.stamp_ns, payload.stamp_ns)
             if payload.fix:

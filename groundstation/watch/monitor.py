@@ -8,7 +8,7 @@ when it comes; of the rest the newest bytes are kept until somebody looks.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 from groundstation.bus.cdr import CodecError, codec_of
@@ -81,6 +81,11 @@ class Monitor:
         self._routes = {
             noun: route for noun, kind in tables.payloads.items() if (route := self._route(kind)) is not None
         }
+
+    @property
+    def nouns(self) -> Container[str]:
+        """Of the topics whose messages change anything here; all others need not be given."""
+        return self._routes.keys()
 
     def take(self, recorded: Recorded, now_ns: int) -> None:
         """Account for one message of the record stream."""

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from groundstation.declarations.message import Message
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import FixAccount, VehicleState
-from groundstation.parts.operation.messages import Latency, SequencePhase
+from groundstation.parts.operation.messages import Latency
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ DRAWN: tuple[type[Message], ...] = (
     VehicleState,
     ControlStatus,
     ValveCommand,
-    SequencePhase,
+    Supervision,
     FixAccount,
     Latency,
 )
@@ -36,7 +37,7 @@ class Track:
         open_masks: Rows of t, open mask; shape (n, 2).
         accounts: Rows of t, used (1 or 0), innovation x, y (m), heading (rad), NIS; shape (n, 6).
         account_reasons: Reason of each of these rows.
-        flying_since_s: When the start sequence reported it; NaN if never.
+        flying_since_s: When its newest flight began; NaN if it never flew.
         latency: The newest summary.
     """
 
@@ -60,6 +61,7 @@ class TrackBuilder:
     _masks: list[tuple[float, ...]] = field(default_factory=list)
     _accounts: list[tuple[float, ...]] = field(default_factory=list)
     _reasons: list[str] = field(default_factory=list)
+    _is_flying: bool = False
     _flying_since_s: float = math.nan
     _latency: Latency | None = None
 
@@ -75,8 +77,10 @@ class TrackBuilder:
                 self._goal.append((t_s, *message.goal_position_table_m, message.goal_heading_rad))
             case ValveCommand():
                 self._masks.append((t_s, float(message.open_mask)))
-            case SequencePhase(phase="flying"):
-                self._flying_since_s = t_s
+            case Supervision():
+                was_flying, self._is_flying = self._is_flying, message.is_in_flight
+                if self._is_flying and not was_flying:
+                    self._flying_since_s = t_s
             case FixAccount():
                 self._reasons.append(message.reason)
                 self._accounts.append((t_s, float(message.used), *message.innovation, message.nis))

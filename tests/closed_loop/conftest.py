@@ -56,6 +56,22 @@ class Flight:
             if payload.vehicle == vehicle and start_s * 1e9 <= now_ns < stop_s * 1e9
         ]
 
+    def modes(self, vehicle="alpha", start_s=0.0):
+        """The modes of a vehicle, each once for as long as it lasts."""
+        from groundstation.parts.supervision.messages import Supervision
+
+        found = []
+        for ruling in self.of(Supervision, vehicle, start_s):
+            if not found or found[-1] != ruling.mode:
+                found.append(ruling.mode)
+        return found
+
+    def faults(self, vehicle="alpha", start_s=0.0):
+        """Ids of the faults that a vehicle had."""
+        from groundstation.parts.supervision.messages import Faults
+
+        return {fault for row in self.of(Faults, vehicle, start_s) for fault in row.ids}
+
     def counters(self, node):
         """The newest counters of a node, by name."""
         from groundstation.parts.operation.messages import Diagnostics

@@ -7,8 +7,9 @@ import pytest
 
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus, VehicleState
 from groundstation.parts.imu.messages import Imu
-from groundstation.parts.operation.messages import Diagnostics, SequencePhase
+from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import Faults
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
 
 FAULT_S, END_S, STOP_S = 4.0, 6.0, 8.0
@@ -25,7 +26,7 @@ def fault(kind, **parameters):
 
 def assert_survived(flight):
     """It flies on, on the table, near its goal, with a state that agrees with truth."""
-    assert flight.of(SequencePhase)[-1].phase == "flying"
+    assert flight.modes()[-1] == "flying"
     truth = flight.of(ReferenceState, start_s=STOP_S - 0.5)
     states = flight.of(VehicleState, start_s=STOP_S - 0.5)
     assert states
@@ -56,16 +57,30 @@ def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
     samples = flight.of(Imu, start_s=FAULT_S + 0.1, stop_s=END_S)
     assert all("gyro_range" in imu.reason for imu in samples)
     assert not any(imu.valid for imu in samples)
-    assert_survived(flight)
+    assert_landed(flight, "imu_implausible")
+    assert flight.run(6.0).modes()[-1] == "resting"  # a code that never changes is for a person to clear
+    flight.request("fly")
+    assert flight.run(4.0).modes()[-1] == "flying"
 
 
-def test_after_a_gyro_stuck_near_its_null_the_vehicle_finds_itself_again(fly):
+def assert_landed(flight, fault):
+    """The fault was named within a second of its beginning, and the vehicle is down, near its goal."""
+    first = next(row for row in flight.of(Faults, start_s=FAULT_S) if fault in row.ids)
+    assert first.stamp_ns * 1e-9 < FAULT_S + 1.0
+    assert not flight.of(ValveStatus)[-1].floating
+    truth = flight.of(ReferenceState)[-1]
+    assert truth.velocity_table_m_s == (0.0, 0.0)
+    assert flight.off_goal()[0][-1] < 0.3
+
+
+def test_a_gyro_stuck_near_its_null_lands_the_vehicle_until_a_person_lets_it_fly(fly):
     flight = fly(fault("stuck_gyro")).run(STOP_S + 6.0)
     late = flight.of(Imu, start_s=FAULT_S + 0.6, stop_s=END_S - 0.1)
     assert {imu.reason for imu in late} == {"gyro_stuck"}
-    assert flight.of(VehicleState)[-1].status == "flying"
-    distances, _ = flight.off_goal(start_s=STOP_S + 5.5)
-    assert distances.max() < 0.4
+    assert_landed(flight, "imu_stuck")
+    assert flight.modes()[-1] == "landed"
+    flight.request("fly")
+    assert flight.run(6.0).modes()[-1] == "flying"
 
 
 @pytest.mark.parametrize(("axis", "name", "usable"), [(0, "x", 0b101), (1, "y", 0b011)])
@@ -108,9 +123,11 @@ def test_without_stars_the_age_of_the_fix_grows_and_the_vehicle_holds_on(fly):
     assert_survived(flight)
 
 
-def test_a_frozen_camera_cannot_pull_the_vehicle_along(fly):
-    flight = fly(fault("frozen_camera")).run(STOP_S)
-    assert_survived(flight)
+def test_a_frozen_camera_is_named_and_lands_the_vehicle(fly):
+    flight = fly(fault("frozen_camera")).run(STOP_S + 1.0)
+    first = next(row for row in flight.of(Faults) if "camera_frozen" in row.ids)
+    assert first.stamp_ns * 1e-9 < FAULT_S + 2.0  # two fixes of 0.67 s, 0.6 s late
+    assert flight.modes(start_s=FAULT_S)[:4] == ["flying", "braking", "holding", "landing"]
 
 
 def test_wrong_fixes_are_refused_and_counted(fly):
@@ -123,16 +140,35 @@ def test_wrong_fixes_are_refused_and_counted(fly):
 
 
 @pytest.mark.parametrize("kind", ["stuck_open_valve", "stuck_closed_valve"])
-def test_the_other_valves_make_up_for_one_that_fails(fly, kind):
-    flight = fly(fault(kind, valve=0)).run(STOP_S)
-    assert_survived(flight)
+def test_a_valve_that_fails_is_named_and_lands_the_vehicle_until_a_person_lets_it_fly(fly, kind):
+    flight = fly(fault(kind, valve=0)).run(STOP_S + 8.0)
+    name = "valve_stuck_open" if kind == "stuck_open_valve" else "valve_stuck_closed"
+    assert name in flight.faults()
+    assert flight.modes()[-1] == "landed"
+    assert flight.off_goal()[0][-1] < 0.2
+    flight.request("fly")
+    assert flight.run(6.0).modes()[-1] == "flying"
 
 
-def test_a_silent_bus_closes_the_valves_and_flight_goes_on_when_it_speaks_again(fly):
-    flight = fly(fault("silent_bus")).run(STOP_S)
-    assert not flight.of(ValveStatus, start_s=FAULT_S + 0.1, stop_s=END_S)
-    first = flight.of(ValveStatus, start_s=END_S)[0]
+def test_a_silent_bus_closes_the_valves_and_the_vehicle_lands_when_it_speaks_again(fly):
+    end_s = FAULT_S + 0.9
+    flight = fly(fault("silent_bus").replace(f"end_s = {END_S}", f"end_s = {end_s}")).run(STOP_S)
+    assert not flight.of(ValveStatus, start_s=FAULT_S + 0.1, stop_s=end_s)
+    first = flight.of(ValveStatus, start_s=end_s)[0]
     assert first.dead_man
     assert first.open_mask == 0
-    assert flight.of(ValveStatus)[-1].armed
-    assert_survived(flight)
+    assert first.armed
+    assert first.floating
+    assert flight.modes(start_s=FAULT_S)[:4] == ["flying", "lost", "landing", "resting"]
+    assert_landed(flight, "can_silent")
+    assert flight.run(8.0).modes()[-1] == "flying"
+
+
+def test_a_bus_that_is_silent_for_more_than_a_second_lands_the_vehicle_without_the_station(fly):
+    flight = fly(fault("silent_bus")).run(END_S + 0.1)
+    first = flight.of(ValveStatus, start_s=END_S)[0]
+    assert (first.floating, first.armed, first.open_mask) == (False, False, 0)
+    # the bearings set down 0.2 s after their air is cut, and friction stops the rest
+    truth = flight.of(ReferenceState, start_s=FAULT_S + 1.25, stop_s=END_S)
+    assert max(np.hypot(*row.velocity_table_m_s) for row in truth) == 0.0
+    assert truth[0].position_table_m == truth[-1].position_table_m

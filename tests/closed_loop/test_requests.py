@@ -6,10 +6,9 @@ import math
 import pytest
 
 from groundstation.declarations.request import Ack
-from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.table import installed_tables
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
+from groundstation.parts.valves.messages import ValveSelection, ValveStatus
 
 ACTIONS = installed_tables().actions
 
@@ -21,9 +20,23 @@ def ask(flight, action, request_id=7, **arguments):
     return [ack for ack in flight.of(Ack) if ack.author == "operator" and ack.request_id == request_id]
 
 
+FIRST = {
+    "fly": ["land"],
+    "release": ["stop"],
+    "float_on": ["land"],
+    "arm": ["land"],
+    "resume": ["brake"],
+    "give_control": ["take_control"],
+}
+"""What has to be asked for before an action counts."""
+
+
 @pytest.mark.parametrize("action", [name for name in ACTIONS if name != "picture"])
 def test_a_known_request_is_answered_once(fly, action):
-    flight = fly().run(2.5)
+    flight = fly().run(4.0)
+    for number, before in enumerate(FIRST.get(action, [])):
+        assert ask(flight, before, request_id=100 + number)[0].accepted
+    flight.run(6.0)
     values = {float: 0.1, str: "stuck_gyro"}
     arguments = {
         argument.name: values[argument.kind]
@@ -31,7 +44,9 @@ def test_a_known_request_is_answered_once(fly, action):
         if argument.default is None
     }
     answers = ask(flight, action, **arguments)
-    assert [(ack.action, ack.accepted, ack.vehicle) for ack in answers] == [(action, True, "alpha")]
+    assert [(ack.action, ack.accepted, ack.vehicle, ack.reason) for ack in answers] == [
+        (action, True, "alpha", "")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -61,25 +76,52 @@ def test_a_vehicle_goes_where_it_is_told(fly):
     assert abs(truth.heading_rad - math.radians(30.0)) < math.radians(2.0)
 
 
-def test_a_stop_is_latched_until_it_is_released(fly):
-    flight = fly().run(3.0)
+def test_a_stop_brakes_holds_lands_and_is_latched_until_a_person_releases_it(fly):
+    flight = fly().run(4.0)
     ask(flight, "stop", request_id=1)
-    assert not any(status.open_mask for status in flight.of(ValveStatus, start_s=3.1))
-    assert flight.of(SequencePhase)[-1].phase == "stopped"
+    flight.run(6.0)
+    assert flight.modes(start_s=3.9) == ["flying", "braking", "holding", "landing", "stopped"]
+    assert not flight.of(ValveStatus)[-1].floating
     (refused,) = ask(flight, "arm", request_id=2)
-    assert "release it first" in refused.reason
-    assert ask(flight, "release", request_id=3)[0].accepted
-    assert flight.of(SequencePhase)[-1].phase == "disarmed"
-    assert ask(flight, "arm", request_id=4)[0].accepted
-    assert flight.of(ValveCommand)[-1].gate == "open"
+    assert "a stop is latched by operator: release it first" in refused.reason
+    assert not ask(flight, "fly", request_id=3)[0].accepted
+    assert ask(flight, "release", request_id=4)[0].accepted
+    assert flight.run(3.0).modes()[-1] == "landed"
+    assert ask(flight, "fly", request_id=5)[0].accepted
+    assert flight.run(4.0).modes()[-1] == "flying"
 
 
-def test_a_disarmed_vehicle_is_left_alone(fly):
-    flight = fly().run(3.0)
-    ask(flight, "disarm")
-    flight.run(3.0)
-    assert flight.of(SequencePhase)[-1].phase == "disarmed"
-    assert not flight.of(VehicleMode)[-1].armed
+def test_a_second_press_cuts_everything_at_once_a_repeated_one_does_not(fly):
+    flight = fly().run(4.0)
+    ask(flight, "stop", request_id=1)
+    ask(flight, "stop", request_id=1)
+    assert flight.modes()[-1] in ("braking", "holding")
+    ask(flight, "stop", request_id=2)
+    assert flight.modes()[-1] == "stopped"
+
+
+@pytest.mark.parametrize("action", ["land", "disarm", "float_off"])
+def test_what_a_person_landed_stays_landed_until_a_person_lets_it_fly(fly, action):
+    flight = fly().run(4.0)
+    asked_s = flight.runner.now_ns * 1e-9
+    ask(flight, action)
+    flight.run(10.0)
+    assert flight.modes()[-1] == "landed"
+    late = flight.of(ValveStatus, start_s=asked_s + 0.1)
+    assert not any(status.floating or status.open_mask or status.armed for status in late)
+    flight.request("fly", request_id=9)
+    assert flight.run(4.0).modes()[-1] == "flying"
+
+
+def test_an_unarmed_vehicle_floats_by_a_persons_explicit_wish_only(fly):
+    flight = fly("\n", changes=[("[vehicles.alpha]", "[vehicles.alpha]\nstarts_by_itself = false")])
+    flight.run(4.0)
+    assert flight.modes() == ["landed"]
+    assert ask(flight, "float_on", request_id=1)[0].accepted
+    status = flight.of(ValveStatus)[-1]
+    assert (status.floating, status.armed) == (True, False)
+    assert ask(flight, "arm", request_id=2)[0].accepted
+    assert flight.run(1.0).modes()[-1] == "flying"
 
 
 def test_braking_holds_until_it_is_resumed(fly):

@@ -10,7 +10,7 @@ from groundstation.declarations.node import Weight
 from groundstation.declarations.request import Ack, Request
 from groundstation.declarations.rig import RecordSection
 from groundstation.declarations.topic import Scope
-from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.parts.table import installed_tables
 from groundstation.recording.policy import ImagePolicy, is_kept
 from groundstation.rig.plan import gives_way, make_node, nodes_of, ports_of, processes_of
@@ -105,7 +105,10 @@ def test_truth_arrives_in_some_example(nodes):
 @names
 def test_what_a_node_receives_is_published_by_somebody(name, nodes):
     published = published_by(nodes[name]) | {(port.reads, port.vehicle) for port, _ in ports_of(RIGS[name])}
-    kinds = {kind for kind, _ in published} | {Request}  # operators ask, too
+    kinds = {kind for kind, _ in published} | {
+        Request,
+        RecorderStatus,
+    }  # operators ask, too, and the recorder reports
     for key, node in nodes[name].items():
         for kind in node.inputs:
             is_received = kind.TOPIC.scope is Scope.RIG or node.sources(kind)
@@ -115,7 +118,7 @@ def test_what_a_node_receives_is_published_by_somebody(name, nodes):
 def test_every_topic_is_published_in_some_example(nodes):
     published = {kind for found in nodes.values() for kind, _ in published_by(found)}
     published |= {port.reads for rig in RIGS.values() for port, _ in ports_of(rig)}
-    published |= {Journal, Diagnostics, Latency}  # of the runner
+    published |= {Journal, Diagnostics, Latency, Request, RecorderStatus}  # of the runner
     tables = installed_tables()
     used = {placed.row.name for rig in RIGS.values() for placed in nodes_of(rig)}
     idle = {

@@ -19,8 +19,9 @@ from groundstation.declarations.request import Action, ArgumentError, Request
 from groundstation.declarations.section import Section
 from groundstation.declarations.topic import Scope
 from groundstation.declarations.view import Newest
-from groundstation.parts.operation.messages import Diagnostics, Latency
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import StopPress
 from groundstation.parts.table import installed_tables
 from groundstation.rig.read import build_rig, load_rig
 
@@ -87,10 +88,11 @@ def test_what_a_part_declares_is_its_own(part):
     makers = {kind for row in part.nodes for kind in row.node_class().outputs} | {
         port.kind.reads for port in part.ports
     }
-    shared = {ReferenceState, *PARTS["operation"].topics}  # a reference may come from several systems
+    # a reference may come from several systems, a press of the stop from a button on the bus
+    shared = {ReferenceState, StopPress, *PARTS["operation"].topics}
     for kind in makers:
         assert TABLES.owner(kind) == part.name or kind in shared, kind.__name__
-    of_runners = {Latency, Diagnostics, Request}
+    of_runners = {Latency, Diagnostics, Request, RecorderStatus}
     everywhere = {kind for row in TABLES.nodes.values() for kind in row.node_class().outputs}
     everywhere |= {port.kind.reads for port in TABLES.ports}
     for kind in part.topics:

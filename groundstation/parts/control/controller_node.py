@@ -8,6 +8,7 @@ from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
@@ -36,7 +37,7 @@ class ControllerNode(Node):
         table_map: What pulls where on the table, fed forward; None where nobody knows.
     """
 
-    inputs = (VehicleState, FusionStatus, ValveDemand, ValveCommand, Request)
+    inputs = (VehicleState, FusionStatus, ValveDemand, ValveCommand, Request, Lease)
     outputs = (Wrench, ControlStatus, Ack)
     trigger = VehicleState
 
@@ -57,6 +58,7 @@ class ControllerNode(Node):
         self._goal = goal
         self._keep_in = keep_in
         self._neighbours = neighbours
+        self._lease = LeaseCheck()
         self._states: dict[str, tuple[int, ControlState]] = {}
         self._own_rate = RateMean()
         self._map = table_map
@@ -92,7 +94,10 @@ class ControllerNode(Node):
                     self._law.reset()
                 self._gate_open = is_open
             case Request() if message.action == GO_TO.name:
-                yield answer(message, now_ns, self._go_to(message))
+                refusal = self._lease.objection(message, now_ns)
+                yield answer(message, now_ns, refusal or self._go_to(message))
+            case Lease():
+                self._lease.take(message)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         fresh = {

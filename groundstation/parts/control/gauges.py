@@ -11,8 +11,8 @@ from groundstation.declarations.readings import RecentErrors, column, distance, 
 from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import Supervision
 
 SETTLING_S = 20.0
 """Left out of the report's numbers after the vehicle began to fly."""
@@ -40,7 +40,7 @@ class StationGauge(Gauge):
     """Distance of the truth from the setpoint while flying, over the last seconds."""
 
     label = "  rms of 30 s, by truth"
-    every = (ReferenceState, ControlStatus, SequencePhase)
+    every = (ReferenceState, ControlStatus, Supervision)
 
     def __init__(self, vehicle: str) -> None:
         super().__init__(vehicle)
@@ -61,8 +61,8 @@ class StationGauge(Gauge):
                 self._errors.add(now_ns, *apart)
         elif isinstance(message, ControlStatus):
             self._goal = message
-        elif isinstance(message, SequencePhase):
-            self._is_flying = message.phase == "flying"
+        elif isinstance(message, Supervision):
+            self._is_flying = message.is_in_flight
         return ()
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:
@@ -73,11 +73,12 @@ class StationGauge(Gauge):
 class StationFigure(Figure):
     """Station keeping by truth, from ``SETTLING_S`` after the vehicle began to fly."""
 
-    inputs = (ReferenceState, ControlStatus, SequencePhase)
+    inputs = (ReferenceState, ControlStatus, Supervision)
 
     def __init__(self) -> None:
         self._truth: list[tuple[float, ...]] = []
         self._goal: list[tuple[float, ...]] = []
+        self._is_flying = False
         self._flying_since_s = math.nan
 
     def take(self, message: Message, t_s: float) -> None:
@@ -85,8 +86,10 @@ class StationFigure(Figure):
             self._truth.append((t_s, *message.position_table_m, message.heading_rad))
         elif isinstance(message, ControlStatus):
             self._goal.append((t_s, *message.goal_position_table_m, message.goal_heading_rad))
-        elif isinstance(message, SequencePhase) and message.phase == "flying":
-            self._flying_since_s = t_s
+        elif isinstance(message, Supervision):
+            was_flying, self._is_flying = self._is_flying, message.is_in_flight
+            if self._is_flying and not was_flying:
+                self._flying_since_s = t_s
 
     def values(self) -> dict[str, Any]:
         truth, goal = (np.array(rows).reshape(-1, 4) for rows in (self._truth, self._goal))

@@ -4,6 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
+from groundstation.control.controllers import controllers
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Section
 
@@ -33,3 +34,10 @@ def control_of(rig: Rig, vehicle: str) -> tuple[ControlSection, str]:
     if own is not None:
         return own, f"vehicles.{vehicle}.control"
     return rig.of_type(vehicle, ControlOfType).control, f"mock_ups.{rig.vehicles[vehicle].mock_up}.control"
+
+
+def neighbours_of(rig: Rig, vehicle: str) -> tuple[str, ...]:
+    """Other vehicles whose states the controller of a vehicle wants."""
+    section = control_of(rig, vehicle)[0]
+    row = controllers()[section.controller]
+    return tuple(row.neighbours(row.config.model_validate(section.parameters)))

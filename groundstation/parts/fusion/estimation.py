@@ -14,7 +14,7 @@ from groundstation.fusion.constants import noise_with_constants
 from groundstation.fusion.constants_file import parse_constants, surest
 from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth
 from groundstation.fusion.slope_grid import noise_with
-from groundstation.parts.fusion.sections import FusionOfVehicle
+from groundstation.parts.fusion.sections import fused_sources
 from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.sections import StarsOfType
 
@@ -73,15 +73,6 @@ def rig_noise(rig: Rig, vehicle: str) -> NoiseModel:
     except FileError as error:
         raise ValueError(f"mock_ups.{rig.vehicles[vehicle].mock_up}.imu.calibration: {error}") from error
     return noise_with_constants(noise, found)
-
-
-def fused_sources(rig: Rig, vehicle: str) -> tuple[str, ...]:
-    """Return whose fixes a vehicle's estimator takes: those named, else the first source that it has."""
-    named = rig.vehicle(vehicle, FusionOfVehicle).fix_sources
-    if named:
-        return named
-    every = rig.tables.fix_sources.values()
-    return tuple(source.name for source in every if source.condition(rig, vehicle))[:1]
 
 
 def floors_of(rig: Rig, vehicle: str) -> dict[str, Floor]:

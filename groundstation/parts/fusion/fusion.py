@@ -9,14 +9,16 @@ import numpy as np
 from groundstation.declarations.fix import Floor, PoseFix
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Request
 from groundstation.frames import wrap_angle
 from groundstation.fusion.estimator import WAITS, Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.first_fixes import CANDIDATE, CANDIDATE_AGE_S
+from groundstation.fusion.fix_repeats import REPEATS, FixRepeats
+from groundstation.fusion.rest_clock import RestChange, RestClock
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.operation.messages import Diagnostics
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 
 STATUS_PERIOD_NS = 200_000_000
@@ -29,7 +31,7 @@ NO_FILES: Mapping[str, tuple[str, str]] = MappingProxyType({})
 
 
 class Fusion(Node):
-    """Feeds an estimator and tells it when the vehicle rests: landed, that is with the float air off.
+    """Feeds an estimator and tells it when the vehicle rests: landed, and its IMU shows it.
 
     Args:
         vehicle: Its name.
@@ -37,11 +39,12 @@ class Fusion(Node):
         method: Its row in the table of estimators.
         payloads: Class of the fixes of each source that is taken, by the source's name.
         floors: What calibration leaves in every fix of each source, beyond its own covariance.
+        rest: Decides whether a landed vehicle rests.
         calibration: The files that the estimator was made from, by name: hash and text.
         stand_in: For accelerometers that are not believed; without one such samples are a hole.
     """
 
-    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Request)
+    inputs: tuple[type[Message], ...] = (Imu, PoseFix, ValveStatus, ValveCommand, Supervision)
     outputs = (VehicleState, FixAccount, FusionStatus, FusionCalibration, Diagnostics)
 
     def __init__(
@@ -51,11 +54,12 @@ class Fusion(Node):
         method: str,
         payloads: Mapping[str, type[PoseFix]],
         floors: Mapping[str, Floor],
+        rest: RestClock,
         calibration: Mapping[str, tuple[str, str]] = NO_FILES,
         stand_in: ForceStandIn | None = None,
     ) -> None:
         super().__init__(vehicle, STATUS_PERIOD_NS)
-        self.inputs = (Imu, *payloads.values(), ValveStatus, ValveCommand, Request)
+        self.inputs = (Imu, *payloads.values(), ValveStatus, ValveCommand, Supervision)
         self._sources = {payload: name for name, payload in payloads.items()}
         self._estimator = estimator
         self._method = method
@@ -65,10 +69,11 @@ class Fusion(Node):
             source: np.diag([xy_m**2, xy_m**2, heading_rad**2])
             for source, (xy_m, heading_rad) in floors.items()
         }
+        self._repeats = FixRepeats()
         self._skipped_ms = 0
-        self._rest_since_ns: int | None = None
-        self._rest_ns = 0
+        self._rest = rest
         self._float_ordered_ns = -ORDER_HOLDS_NS
+        self._is_air_ordered = False
         self._state: PlanarState | None = None
         self._fix_stamp_ns = 0
         self._used = self._refused = self._ticks = 0
@@ -83,6 +88,15 @@ class Fusion(Node):
         match message:
             case Imu():
                 yield from self._propagate(message)
+                self._follow_rest(
+                    self._rest.sample(
+                        message.stamp_ns,
+                        message.elapsed_ms * 1e-3,
+                        (message.rate_body_rad_s, *message.force_body_m_s2),
+                        now_ns,
+                        is_valid=message.valid,
+                    )
+                )
             case PoseFix(fix=True):
                 yield from self._correct(message, self._sources[type(message)], now_ns)
             case ValveStatus():
@@ -90,11 +104,14 @@ class Fusion(Node):
                     self._receive_float(now_ns, floating=message.floating)
             case ValveCommand() if self._stand_in is not None:
                 self._stand_in.receive(message, now_ns)
-            case Request(action="float_on"):
-                self._float_ordered_ns = now_ns
-                self._receive_float(now_ns, floating=True)
+            case Supervision():
+                if message.air_on and not self._is_air_ordered:
+                    self._float_ordered_ns = now_ns
+                    self._receive_float(now_ns, floating=True)
+                self._is_air_ordered = message.air_on
 
     def tick(self, now_ns: int) -> Iterator[Message]:
+        self._follow_rest(self._rest.check(now_ns))
         yield from self._overdue(now_ns)
         state = self._state
         age_s = (now_ns - self._fix_stamp_ns) * 1e-9 if self._fix_stamp_ns else math.inf
@@ -110,7 +127,7 @@ class Fusion(Node):
             self._method,
             biases[0],
             biases[1:],
-            self._rest_s(now_ns),
+            self._rest.rest_s,
             self._used,
             self._refused,
             age_s,
@@ -144,6 +161,11 @@ class Fusion(Node):
             yield self._say(state)
 
     def _correct(self, fix: PoseFix, source: str, now_ns: int) -> Iterator[Message]:
+        if self._repeats.is_repeated(source, (fix.x_m, fix.y_m, fix.heading_rad)):
+            self._estimator.counters.add("fix_" + REPEATS.replace(" ", "_"))
+            nothing = (math.nan,) * 4
+            yield self._account(FixOutcome(fix.stamp_ns, False, REPEATS, *nothing, source), now_ns)
+            return
         covariance = np.array(fix.covariance).reshape(3, 3) + self._floors[source]
         if self._state is not None:  # an uncertain stamp of a moving vehicle is an uncertain pose
             motion = np.array([self._state.vx_m_s, self._state.vy_m_s, self._state.rate_rad_s])
@@ -205,17 +227,18 @@ class Fusion(Node):
         )
 
     def _receive_float(self, now_ns: int, *, floating: bool) -> None:
-        if not floating and self._rest_since_ns is None:
-            self._rest_since_ns = now_ns
-            self._estimator.begin_rest(now_ns)
-        elif floating and self._rest_since_ns is not None:
-            self._rest_ns += now_ns - self._rest_since_ns
-            self._rest_since_ns = None
-            self._estimator.end_rest(now_ns)
+        if floating:
+            self._follow_rest(self._rest.float_up(now_ns))
+        else:
+            self._rest.land()
 
-    def _rest_s(self, now_ns: int) -> float:
-        going_on = 0 if self._rest_since_ns is None else now_ns - self._rest_since_ns
-        return (self._rest_ns + going_on) * 1e-9
+    def _follow_rest(self, change: RestChange | None) -> None:
+        if change is None:
+            return
+        if change.begins:
+            self._estimator.begin_rest(change.t_ns)
+        else:
+            self._estimator.end_rest(change.t_ns)
 
 
 def _status(state: PlanarState | None) -> str:

@@ -66,7 +66,8 @@ class FusionStatus(Message):
         method: Row of the table of estimators.
         bias_rate_rad_s: What is subtracted from the gyro.
         bias_force_m_s2: What is subtracted from the accelerometers (body).
-        rest_s: Length of the rest used so far for zero offsets.
+        rest_s: Length of the rest without a break that zero offsets are taken from: the float air off, every
+            sample valid, no gap, no motion; after take-off that of the rest before it.
         fixes_used: Since start.
         fixes_refused: Since start.
         fix_age_s: Since the exposure of the newest used fix, infinity before the first.

@@ -9,12 +9,13 @@ from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator
 from groundstation.fusion.estimators import ESTIMATORS
-from groundstation.parts.fusion.estimation import calibration_texts, floors_of, fused_sources, noise_of
+from groundstation.fusion.rest_clock import RestClock
+from groundstation.parts.fusion.estimation import calibration_texts, floors_of, noise_of, rig_noise
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.fusion import NO_FILES, Fusion
 from groundstation.parts.fusion.gauges import FIGURES, GAUGES
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
-from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle
+from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle, fused_sources
 
 
 def _fusion(rig: Rig, vehicle: str) -> Node:
@@ -38,7 +39,8 @@ def fusion_node(
     """The fusion node of a vehicle around an estimator, with the fixes that the rig lets it take."""
     sources = rig.tables.fix_sources
     payloads = {name: sources[name].payload for name in fused_sources(rig, vehicle)}
-    return Fusion(vehicle, estimator, method, payloads, floors_of(rig, vehicle), calibration, stand_in)
+    floors, rest = floors_of(rig, vehicle), RestClock(rig_noise(rig, vehicle))
+    return Fusion(vehicle, estimator, method, payloads, floors, rest, calibration, stand_in)
 
 
 def _check(rig: Rig) -> None:

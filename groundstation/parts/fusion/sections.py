@@ -4,6 +4,7 @@ from typing import Self
 
 from pydantic import model_validator
 
+from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Positive, Section
 from groundstation.fusion.estimators import ESTIMATORS
 
@@ -31,3 +32,12 @@ class FusionOfVehicle(Section):
     """Keys of a vehicle: whose fixes its estimator takes; the first source that it has, if none is named."""
 
     fix_sources: tuple[str, ...] = ()
+
+
+def fused_sources(rig: Rig, vehicle: str) -> tuple[str, ...]:
+    """Return whose fixes a vehicle's estimator takes: those named, else the first source that it has."""
+    named = rig.vehicle(vehicle, FusionOfVehicle).fix_sources
+    if named:
+        return named
+    every = rig.tables.fix_sources.values()
+    return tuple(source.name for source in every if source.condition(rig, vehicle))[:1]

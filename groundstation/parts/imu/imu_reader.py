@@ -18,7 +18,8 @@ from groundstation.declarations.node import Node
 from groundstation.parts.imu.messages import Imu, ImuBytes, ImuOrder, ImuRaw
 from groundstation.parts.operation.messages import Diagnostics
 
-PERIOD_NS = 1_000_000_000
+PERIOD_NS = 500_000_000
+DIAGNOSTICS_EVERY = 2
 TICK_S = 1e-3
 WORST_STAMP_S = 0.25
 """No link delays so unevenly: stamps this vague mean that the rig's averaging is not the block's."""
@@ -65,7 +66,7 @@ class ImuReader(Node):
         self._given_temperature_c = temperature_c
         self._found_number: int | None = None
         self._complaint = ""
-        self._tag = 0
+        self._tag = self._ticks = 0
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns
@@ -84,19 +85,23 @@ class ImuReader(Node):
             yield self._sample(frame, stamp)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
-        counters = self._parser.counters.as_dict()
-        keys, values = tuple(counters), tuple(str(count) for count in counters.values())
-        level = WARNING if self._complaint else OK
-        summary = f"{self.vehicle}/imu: samples are not believed: {self._complaint}" if level else ""
-        name = f"{self.vehicle}/imu_reader"
-        yield Diagnostics(now_ns, self.vehicle, name, level, summary, keys, values)
+        self._ticks += 1
+        if self._ticks % DIAGNOSTICS_EVERY == 0:
+            yield self._diagnostics(now_ns)
         if self._parser.detected_version != 2:
             return
         self._tag = (self._tag + 1) % 256
         if self._seen_averaging not in (None, self._averaging):
             yield ImuOrder(now_ns, self.vehicle, encode_set_averaging(self._tag, self._averaging))
-        elif self._serial_number is not None and self._found_number is None:
+        elif self._serial_number is not None:  # again and again: blocks are swapped while it runs
             yield ImuOrder(now_ns, self.vehicle, encode_identify(self._tag))
+
+    def _diagnostics(self, now_ns: int) -> Diagnostics:
+        counters = self._parser.counters.as_dict()
+        keys, values = tuple(counters), tuple(str(count) for count in counters.values())
+        level = WARNING if self._complaint else OK
+        summary = f"{self.vehicle}/imu: samples are not believed: {self._complaint}" if level else ""
+        return Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/imu_reader", level, summary, keys, values)
 
     def _raw(self, frame: ImuFrame, stamp: TickStamp) -> ImuRaw:
         return ImuRaw(

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from groundstation.declarations.rig_file import RigFile
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, NonNegative, Positive, Section
 
 
 class ImuSection(Section):
@@ -19,7 +19,7 @@ class ImuSection(Section):
     baud: Literal[115200, 250000] = 250000
     protocol: Literal["auto", "v1", "v2"] = "auto"
     averaging: int = Field(default=10, ge=1, le=250)
-    ftdi_latency_s: NonNegative = 0.016
+    ftdi_latency_s: Delay = 0.016
     temperature_c: float | None = None
     position_body_m: tuple[float, float] = (0.0, 0.0)
     position_sigma_m: NonNegative = 0.001

@@ -5,6 +5,7 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Action, Argument, ArgumentError, Request, answer
@@ -33,12 +34,13 @@ class FailureDesk(Node):
         vehicles: Those that a failure can befall.
     """
 
-    inputs = (Request, InjectedFailure)
+    inputs = (Request, Lease, InjectedFailure)
     outputs = (FailureOrder, Ack)
 
     def __init__(self, vehicles: tuple[str, ...]) -> None:
         super().__init__("", PERIOD_NS)
         self._vehicles = vehicles
+        self._lease = LeaseCheck()
         self._waiting: deque[tuple[int, Request, str]] = deque()
 
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
@@ -48,6 +50,8 @@ class FailureDesk(Node):
         match message:
             case Request() if message.action == INJECT.name:
                 yield from self._order(message, now_ns)
+            case Lease():
+                self._lease.take(message)
             case InjectedFailure() if self._waiting:
                 _, request, failure = self._waiting[0]
                 if message.refusal:
@@ -63,6 +67,10 @@ class FailureDesk(Node):
             yield answer(request, now_ns, "the laboratory does not answer")
 
     def _order(self, request: Request, now_ns: int) -> Iterator[Message]:
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            yield answer(request, now_ns, refusal)
+            return
         try:
             given = INJECT.read(request)
             parameters = _numbers(str(given["parameters"]))

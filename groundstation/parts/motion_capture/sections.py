@@ -2,7 +2,7 @@
 
 from typing import Any, Literal
 
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, Positive, Section, Sigma
 
 Triple = tuple[float, float, float]
 
@@ -16,14 +16,14 @@ class MotionCaptureSection(Section):
     """
 
     address: dict[str, Any] | str
-    delay_s: NonNegative = 0.01
-    delay_sigma_s: NonNegative = 0.002
+    delay_s: Delay = 0.01
+    delay_sigma_s: Delay = 0.002
     timeout_s: Positive = 1.0
     up: Literal["y", "z"] = "z"
     origin_table_m: Triple = (0.0, 0.0, 0.0)
     yaw_deg: float = 0.0
-    sigma_xy_m: Positive = 0.0005
-    sigma_heading_rad: Positive = 0.001
+    sigma_xy_m: Sigma = 0.0005
+    sigma_heading_rad: Sigma = 0.001
 
 
 class MotionCaptureOfRig(Section):

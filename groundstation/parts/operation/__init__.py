@@ -1,1 +1,1 @@
-"""How a rig is run: start sequence, calibrations in use, health, latency."""
+"""How a rig is run: recorder, calibrations in use, health, latency."""

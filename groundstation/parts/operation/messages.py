@@ -1,20 +1,38 @@
-"""How a rig is run: start sequence, calibrations in use, health, latency."""
+"""How a rig is run: recorder, calibrations in use, health, latency."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import PACKAGE, U8, Float64Sequence, Message, Text, TextSequence
+from groundstation.declarations.message import (
+    F64,
+    PACKAGE,
+    U8,
+    U64,
+    Float64Sequence,
+    Message,
+    Text,
+    TextSequence,
+)
 from groundstation.declarations.topic import Scope, Topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SequencePhase(Message):
-    """Where the start sequence of a mock-up is; latched."""
+class RecorderStatus(Message):
+    """The recorder is alive, and how long it can go on; twice a second where a rig is recorded.
 
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/SequencePhase"
-    TOPIC: ClassVar = Topic("sequence_phase", latched=True)
-    phase: Text
-    detail: Text
+    Attributes:
+        path: Of the recording.
+        written_bytes: So far.
+        free_bytes: On its disk.
+        room_s: How long that is enough at the rate so far.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/RecorderStatus"
+    TOPIC: ClassVar = Topic("recorder_status", 2, scope=Scope.RIG)
+    path: Text
+    written_bytes: U64
+    free_bytes: U64
+    room_s: F64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

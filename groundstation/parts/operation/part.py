@@ -1,36 +1,23 @@
-"""Part ``operation``: how a rig is run: requests, start sequence, health, calibrations in use, latency."""
+"""Part ``operation``: how a rig is run: requests, control lease, recorder, health, calibrations, latency."""
 
+from groundstation.declarations.lease import Lease
 from groundstation.declarations.node import STATION, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.request import Ack, Request
 from groundstation.declarations.rig import Rig
-from groundstation.declarations.section import Section
-from groundstation.parts.fusion.sections import FusionOfType
-from groundstation.parts.operation.gauges import GAUGES
-from groundstation.parts.operation.messages import CalibrationInUse, Diagnostics, Latency, SequencePhase
-from groundstation.parts.operation.start_sequence import StartSequence
+from groundstation.parts.operation.lease_desk import ACTIONS, LeaseDesk
+from groundstation.parts.operation.messages import CalibrationInUse, Diagnostics, Latency, RecorderStatus
 
 
-class OperationOfVehicle(Section):
-    """Keys of a vehicle."""
-
-    starts_by_itself: bool = True
-
-
-def _starts_by_itself(rig: Rig, vehicle: str) -> bool:
-    return rig.vehicle(vehicle, OperationOfVehicle).starts_by_itself
+def _lease_desk(rig: Rig, vehicle: str) -> Node:
+    del vehicle
+    return LeaseDesk(tuple(rig.vehicles))
 
 
-def _start_sequence(rig: Rig, vehicle: str) -> Node:
-    return StartSequence(vehicle, rig.of_type(vehicle, FusionOfType).fusion.rest_s)
-
-
-_START = NodeRow("start_sequence", STATION, Weight.LIGHT, StartSequence, _start_sequence, _starts_by_itself)
 PART = Part(
     name="operation",
-    summary="requests and answers, the start sequence, health and latency",
-    topics=(Request, Ack, SequencePhase, CalibrationInUse, Diagnostics, Latency),
-    nodes=(_START,),
-    vehicle=OperationOfVehicle,
-    gauges=GAUGES,
+    summary="requests and answers, control lease, recorder, health and latency",
+    topics=(Request, Ack, Lease, RecorderStatus, CalibrationInUse, Diagnostics, Latency),
+    nodes=(NodeRow("lease_desk", STATION, Weight.LIGHT, LeaseDesk, _lease_desk, is_of_rig=True),),
+    actions=tuple(ACTIONS.values()),
 )

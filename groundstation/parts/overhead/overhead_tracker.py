@@ -17,6 +17,7 @@ from groundstation.overhead.liveries import parse_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.overhead.messages import OverheadFix, OverheadImage
+from groundstation.star_tracking.picture_repeats import PictureRepeats
 
 
 class OverheadTracker(Node):
@@ -46,6 +47,7 @@ class OverheadTracker(Node):
             camera.value(OverheadCamera.parse), circles.value(parse_liveries)
         )
         self._delay = delay
+        self._repeats = PictureRepeats()
 
     def start(self, now_ns: int) -> Iterator[Message]:
         content = [file.text() for file in self._files]
@@ -58,6 +60,11 @@ class OverheadTracker(Node):
         assert isinstance(message, OverheadImage)
         exposure_ns = self._delay.middle_ns(message.device_stamp_ns or message.stamp_ns)
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, 3)
+        reason = self._repeats.complaint_about(image, message.stamp_ns)
+        if reason:
+            for vehicle in self._vehicles:
+                yield self._refusal(exposure_ns, vehicle, reason)
+            return
         try:
             answers = self._tracker.look(image)
         except ValueError as error:  # another camera than the file's

@@ -1,7 +1,7 @@
 """Keys of a rig file for the camera over the table."""
 
 from groundstation.declarations.rig_file import RigFile
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, Positive, Section, Sigma
 
 
 class OverheadCameraSection(Section):
@@ -14,11 +14,11 @@ class OverheadCameraSection(Section):
     address: str
     camera: RigFile
     circles: RigFile
-    delay_s: NonNegative = 0.0
-    delay_sigma_s: NonNegative = 0.002
+    delay_s: Delay = 0.0
+    delay_sigma_s: Delay = 0.002
     timeout_s: Positive = 2.0
-    sigma_xy_m: Positive = 0.001
-    sigma_heading_rad: Positive = 0.003
+    sigma_xy_m: Sigma = 0.001
+    sigma_heading_rad: Sigma = 0.003
 
 
 class OverheadOfRig(Section):

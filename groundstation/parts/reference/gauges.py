@@ -10,8 +10,8 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.readings import RecentErrors, column, distance, pose_cell
 from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import Supervision
 
 SETTLING_S = 20.0
 """Left out of the report's numbers after the vehicle began to fly."""
@@ -61,11 +61,12 @@ class EstimateGauge(Gauge):
 class EstimateFigure(Figure):
     """The estimate against truth, from ``SETTLING_S`` after the vehicle began to fly."""
 
-    inputs = (ReferenceState, VehicleState, SequencePhase)
+    inputs = (ReferenceState, VehicleState, Supervision)
 
     def __init__(self) -> None:
         self._truth: list[tuple[float, ...]] = []
         self._state: list[tuple[float, ...]] = []
+        self._is_flying = False
         self._flying_since_s = math.nan
 
     def take(self, message: Message, t_s: float) -> None:
@@ -73,8 +74,10 @@ class EstimateFigure(Figure):
             self._truth.append((t_s, *message.position_table_m, message.heading_rad))
         elif isinstance(message, VehicleState):
             self._state.append((t_s, *message.position_table_m, message.heading_rad))
-        elif isinstance(message, SequencePhase) and message.phase == "flying":
-            self._flying_since_s = t_s
+        elif isinstance(message, Supervision):
+            was_flying, self._is_flying = self._is_flying, message.is_in_flight
+            if self._is_flying and not was_flying:
+                self._flying_since_s = t_s
 
     def values(self) -> dict[str, Any]:
         truth, state = (np.array(rows).reshape(-1, 4) for rows in (self._truth, self._state))

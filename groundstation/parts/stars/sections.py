@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import model_validator
 
 from groundstation.declarations.rig_file import RigFile
-from groundstation.declarations.section import NonNegative, Positive, Section
+from groundstation.declarations.section import Delay, Positive, Section, Sigma
 from groundstation.star_tracking.stamp_delay import parse_delay
 
 
@@ -17,14 +17,14 @@ class StarCameraSection(Section):
 
     camera: RigFile
     ceiling: RigFile
-    delay_s: NonNegative = 0.0
-    delay_sigma_s: NonNegative = 0.002
+    delay_s: Delay = 0.0
+    delay_sigma_s: Delay = 0.002
     delay_file: RigFile | None = None
     timeout_s: Positive = 2.0
-    exposure_s: NonNegative = 0.0
-    readout_s: NonNegative = 0.0
-    sigma_xy_m: Positive = 0.001
-    sigma_heading_rad: Positive = 0.0009
+    exposure_s: Delay = 0.0
+    readout_s: Delay = 0.0
+    sigma_xy_m: Sigma = 0.001
+    sigma_heading_rad: Sigma = 0.0009
 
     @model_validator(mode="before")
     @classmethod

@@ -26,6 +26,8 @@ from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 _STILL_M = 1e-3
 """While its rows are read the picture may move so far; beyond, its lights are no witnesses of places."""
+REPEATED = "the spots repeat: every light is bit for bit where it was in the picture before"
+"""Why there is no fix: the camera, or what finds the spots, is frozen."""
 
 
 class StarTracker(Node):
@@ -66,6 +68,7 @@ class StarTracker(Node):
         self._states: StateMemory[VehicleState] = StateMemory()
         self._choice = PictureChoice()
         self._delay = delay
+        self._last: tuple[bytes, bytes] | None = None
 
     def start(self, now_ns: int) -> Iterator[Message]:
         content = [file.text() for file in self._files]
@@ -77,6 +80,8 @@ class StarTracker(Node):
         match message:
             case VehicleState():
                 self._states.remember(message)
+            case StarSpots(reason="") as spots if self._repeats(spots):
+                yield star_answers.refusal_message(spots, REPEATED, *self._exposure(spots))
             case StarSpots(reason="") as spots:
                 yield from self._solve(spots)
             case StarSpots() as spots:
@@ -113,6 +118,11 @@ class StarTracker(Node):
                 self._tracker.drop(self._watch.dropped)
             for found in changes:
                 yield star_answers.change_message(spots, found, exposure_ns)
+
+    def _repeats(self, spots: StarSpots) -> bool:
+        """Whether the lights are bit for bit where they were in the set before: noise never does that."""
+        last, self._last = self._last, (spots.u_px.tobytes(), spots.v_px.tobytes())
+        return len(spots.u_px) > 0 and self._last == last
 
     def _exposure(self, spots: StarSpots) -> tuple[int, float]:
         """Middle of the exposure and its standard deviation: from the driver's stamp where there is one."""

@@ -1,27 +1,27 @@
-"""Command multiplexer: who may command the valves. Stop and brake > operator > controller."""
+"""Command multiplexer: who may command the valves, by the law that the supervisor rules."""
 
 from collections.abc import Iterator
 
-from groundstation.control.brake import BrakeConfig, brake_wrench
-from groundstation.control.edge import EdgeVerdict, edge_outlook
-from groundstation.control.keep_in import KeepIn
+from groundstation.control.brake import BrakeConfig, brake_wrench, dead_reckoned
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux, MuxConfig, Selection, Source
-from groundstation.control.state import BodyWrench, ControlState
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.valves.actions import MULTIPLEXER
+from groundstation.parts.supervision.messages import Supervision
+from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.messages import ValveDemand, ValveSelection
+from groundstation.supervision.modes import Law
 
 PERIOD_NS = 20_000_000
 CLOSED = bytes(8)
-RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
-SLOPE_M_S2 = 0.005  # a table half a milliradian off level
-REACTION_S = 0.15  # age of the state, a modulation period, the opening of a valve
+RULING_NS = 500_000_000
+"""A ruling older than this is none: the supervisor is silent."""
 
 
 class CommandMuxNode(Node):
@@ -33,10 +33,9 @@ class CommandMuxNode(Node):
         brake: The brake law.
         model: Mass properties and valves.
         modulators: Two, for braking and for pushing by hand, apart from that of the controller.
-        keep_in: Region of the table; a vehicle that would not stop inside is braked.
     """
 
-    inputs = (ValveDemand, VehicleState, Request)
+    inputs = (ValveDemand, VehicleState, Supervision, Request, Lease)
     paced = (VehicleState,)
     outputs = (ValveSelection, Ack)
     trigger = ValveDemand
@@ -48,10 +47,8 @@ class CommandMuxNode(Node):
         brake: BrakeConfig,
         model: VehicleModel,
         modulators: tuple[PulseModulator, PulseModulator],
-        keep_in: KeepIn,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self._keep_in = keep_in
         self._choice: CommandMux[bytes] = CommandMux(config)
         self._brake = brake
         self._model = model
@@ -59,11 +56,14 @@ class CommandMuxNode(Node):
         self._modulator, self._hand = modulators
         self._period_ns = round(self._modulator.config.period_s * 1e9)
         self._brake_due_ns = 0
-        self._brake_asked = False
+        self._ruling: Supervision | None = None
+        self._ruling_ns = 0
+        self._lease = LeaseCheck()
         self._push: BodyWrench | None = None
         self._push_until_ns = self._push_due_ns = 0
         self._state: ControlState | None = None
-        self._braking_m_s2 = RELIED_ON * self._envelope.max_force_n / model.mass_kg - SLOPE_M_S2
+        self._state_ns = 0
+        self._braked_with = NO_WRENCH
         self._counter = self._pulse_id = 0
         self._on_time_ms = CLOSED
         self._source: Source | None = None
@@ -80,39 +80,46 @@ class CommandMuxNode(Node):
                     message.heading_rad,
                     message.rate_rad_s,
                 )
+                self._state_ns = now_ns
                 self._choice.receive_state(now_ns)
-            case Request(action="stop"):
-                self._choice.stop(f"asked for by {message.author}")
-                yield self._select(now_ns)
-            case Request(action="release"):
-                self._choice.release_stop()
-            case Request() if message.action in MULTIPLEXER:
-                yield answer(message, now_ns, self._carry_out(message, now_ns))
+            case Supervision():
+                yield from self._obey(message, now_ns)
+            case Lease():
+                self._lease.take(message)
+            case Request(action="resume") if not self._lease.objection(message, now_ns):
+                self._push = None
+            case Request() if message.action == PUSH.name:
+                yield answer(message, now_ns, self._begin_push(message, now_ns))
 
     def tick(self, now_ns: int) -> Iterator[Message]:
-        if self._brake_asked:
-            self._choice.brake(now_ns, "asked for by request")
-        elif self._is_leaving():
-            self._choice.brake(now_ns, "it would not stop before the edge of the table")
         if self._push is not None:
             self._pushing(self._push, now_ns)
         yield self._select(now_ns)
 
-    def _carry_out(self, request: Request, now_ns: int) -> str:
-        """Do what was asked; the reason if it cannot be done."""
+    def _obey(self, ruling: Supervision, now_ns: int) -> Iterator[Message]:
+        before, self._ruling, self._ruling_ns = self._ruling, ruling, now_ns
+        if before is None or before.law != ruling.law:
+            self._push = None
+            self._choice.forget()
+            yield self._select(now_ns)
+
+    def _begin_push(self, request: Request, now_ns: int) -> str:
+        """Push by hand from now on; the reason if it cannot be done."""
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            return refusal
         try:
-            given = MULTIPLEXER[request.action].read(request)
+            given = PUSH.read(request)
         except ArgumentError as error:
             return str(error)
-        if request.action == "push":
-            self._push = BodyWrench(
-                (float(given["force_x_n"]), float(given["force_y_n"])), float(given["torque_nm"])
-            )
-            self._push_until_ns, self._push_due_ns = now_ns + round(float(given["span_s"]) * 1e9), now_ns
-            self._hand.reset()
-            return ""
-        self._brake_asked = request.action == "brake"
-        self._push = None
+        if self._ruling is None or self._ruling.law != Law.CONTROLLER:
+            mode = "waiting for its supervisor" if self._ruling is None else self._ruling.mode
+            return f"only a flying vehicle can be pushed, it is {mode}"
+        self._push = BodyWrench(
+            (float(given["force_x_n"]), float(given["force_y_n"])), float(given["torque_nm"])
+        )
+        self._push_until_ns, self._push_due_ns = now_ns + round(float(given["span_s"]) * 1e9), now_ns
+        self._hand.reset()
         return ""
 
     def _pushing(self, push: BodyWrench, now_ns: int) -> None:
@@ -124,14 +131,19 @@ class CommandMuxNode(Node):
             self._choice.operate(bytes(self._hand.update(push).on_time_ms), now_ns)
             self._push_due_ns += self._period_ns
 
-    def _is_leaving(self) -> bool:
-        if self._state is None:
-            return False
-        outlook = edge_outlook(self._state, self._keep_in, self._braking_m_s2, reaction_s=REACTION_S)
-        return outlook.verdict is not EdgeVerdict.CLEAR
+    def _choose(self, now_ns: int) -> Selection[bytes]:
+        ruling = self._ruling
+        if ruling is None or now_ns - self._ruling_ns > RULING_NS:
+            return Selection(Source.CLOSED, None, False, "nothing comes from the supervisor")
+        match ruling.law:
+            case Law.CONTROLLER:
+                return self._choice.select(now_ns)
+            case Law.BRAKE:
+                return self._choice.brake(now_ns, f"{ruling.mode}: {ruling.cause}")
+        return Selection(Source.CLOSED, None, False, f"{ruling.mode}: {ruling.cause}")
 
     def _select(self, now_ns: int) -> ValveSelection:
-        selection = self._choice.select(now_ns)
+        selection = self._choose(now_ns)
         changed = selection.source is not self._source
         self._source = selection.source
         if selection.source is Source.BRAKE:
@@ -147,10 +159,22 @@ class CommandMuxNode(Node):
         if changed:
             self._modulator.reset()
             self._brake_due_ns = now_ns
-        if now_ns >= self._brake_due_ns and self._state is not None:
-            wrench = brake_wrench(self._state, self._brake, self._model, self._envelope)
-            self._pulse(bytes(self._modulator.update(wrench).on_time_ms))
-            self._brake_due_ns += self._period_ns
+            self._braked_with = NO_WRENCH
+        if now_ns < self._brake_due_ns or self._state is None:
+            return
+        wrench = brake_wrench(self._carried(self._state, now_ns), self._brake, self._model, self._envelope)
+        pulses = self._modulator.update(wrench)
+        self._braked_with = pulses.delivered
+        self._pulse(bytes(pulses.on_time_ms))
+        self._brake_due_ns += self._period_ns
+
+    def _carried(self, state: ControlState, now_ns: int) -> ControlState:
+        """The newest state; where none came for longer than a period, what the pulses have made of it."""
+        if now_ns - self._state_ns <= self._period_ns:
+            return state
+        period_s = self._period_ns * 1e-9
+        self._state = dead_reckoned(state, self._braked_with, period_s, self._model)
+        return self._state
 
     def _pulse(self, on_time_ms: bytes) -> None:
         self._on_time_ms = on_time_ms

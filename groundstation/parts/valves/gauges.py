@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from groundstation.declarations.message import Message
 from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
 
 SILENT_S = 3.0
 """So long after the bus was opened a valve node should have reported."""
 BUS = "valve_bus"
 """Channel of the bus that all valve nodes share."""
 _VALVES = 8
+_GATES = {"open": "armed"}
+"""Words for people: that a gate lets commands through does not mean that a valve is open."""
 
 
 class GateGauge(Gauge):
@@ -20,7 +22,7 @@ class GateGauge(Gauge):
 
     label = "valves"
     every = (Diagnostics,)
-    newest = (VehicleMode, ValveCommand, ValveStatus)
+    newest = (ValveCommand, ValveStatus)
     rated = (ValveStatus,)
 
     def __init__(self, vehicle: str) -> None:
@@ -49,12 +51,11 @@ class GateGauge(Gauge):
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:
         del now_ns
-        mode, command, status = newest.get(VehicleMode), newest.get(ValveCommand), newest.get(ValveStatus)
+        command, status = newest.get(ValveCommand), newest.get(ValveStatus)
         if command is None:
             return NOTHING
-        is_armed = mode is not None and mode.armed
         level = Level.GOOD if command.gate == "open" else Level.WARNING
-        shown = cell(f"{'armed' if is_armed else 'disarmed'}, {command.gate} ", level)
+        shown = cell(f"{_GATES.get(command.gate, command.gate)} ", level)
         if status is None:
             return shown + cell("·" * _VALVES)
         shown += cell("".join("●" if status.open_mask >> valve & 1 else "·" for valve in range(_VALVES)))
@@ -63,7 +64,7 @@ class GateGauge(Gauge):
     def phrase(self, newest: Newest, now_ns: int) -> str:
         del now_ns
         command = newest.get(ValveCommand)
-        return f"{'-' if command is None else command.gate:<8}"
+        return f"{'-' if command is None else _GATES.get(command.gate, command.gate):<8}"
 
 
 class SourceGauge(Gauge):
@@ -78,7 +79,7 @@ class SourceGauge(Gauge):
         if selection is None:
             return NOTHING
         text = selection.source + (f": {selection.reason}" if selection.reason else "")
-        return cell(text, Level.WARNING if selection.source in ("stop", "brake") else Level.PLAIN)
+        return cell(text, Level.WARNING if selection.source in ("closed", "brake") else Level.PLAIN)
 
 
 class TankGauge(Gauge):

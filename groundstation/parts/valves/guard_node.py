@@ -1,6 +1,6 @@
 """Guard: the shell around the one gate before the valves (``drivers.valve_bus.guard``)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import fields
 
 from drivers.valve_bus import messages as bus
@@ -8,38 +8,36 @@ from drivers.valve_bus.guard import Guard
 from drivers.valve_bus.guard_account import Verdict
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.parts.valves.actions import GUARD
-from groundstation.parts.valves.messages import NO_STOP, ValveCommand, ValveSelection, VehicleMode
+from groundstation.parts.supervision.messages import Supervision
+from groundstation.parts.valves.messages import NO_STOP, ValveCommand, ValveSelection, ValveStatus
 
 PERIOD_NS = 20_000_000
+RULING_NS = 500_000_000
+"""A ruling older than this is none: the supervisor is silent."""
+ARM_AGAIN_NS = 100_000_000
 DIAGNOSTICS_EVERY = 50
 
 
 class GuardNode(Node):
-    """Lets commands through while the vehicle is armed and the selection is fresh; closes otherwise.
+    """Lets commands through while the supervisor says so and the selection is fresh; closes otherwise.
 
     Args:
         vehicle: Its name.
         guard: The gate before its valves.
-        known: Names of all actions; it refuses what none of them is.
-        absent: Those of them that no node answers here, and why; it refuses these, too.
     """
 
-    inputs = (ValveSelection, Request)
-    outputs = (ValveCommand, VehicleMode, Ack, Diagnostics)
+    inputs = (ValveSelection, Supervision, ValveStatus)
+    outputs = (ValveCommand, Diagnostics)
     trigger = ValveSelection
 
-    def __init__(self, vehicle: str, guard: Guard, known: frozenset[str], absent: Mapping[str, str]) -> None:
+    def __init__(self, vehicle: str, guard: Guard) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._guard = guard
-        self._known = known
-        self._absent = absent
+        self._ruling_ns: int | None = None
+        self._obeyed: tuple[bool, bool, bool] | None = None
+        self._armed_ns = 0
         self._ticks = 0
-
-    def start(self, now_ns: int) -> Iterator[Message]:
-        yield self._mode(now_ns, "", "the guard starts disarmed")
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
@@ -49,14 +47,17 @@ class GuardNode(Node):
                 )
                 if self._guard.update(now_ns, command) is Verdict.NEW_PULSE:
                     yield self._output(now_ns)
-            case Request() if self._answers(message.action):
-                reason = self._carry_out(message, now_ns)
-                yield answer(message, now_ns, reason)
-                if not reason:
-                    yield self._mode(now_ns, message.author, message.action)
+            case Supervision():
+                self._ruling_ns = now_ns
+                if self._obey(message, now_ns):
                     yield self._output(now_ns)
+            case ValveStatus(armed=False) if self._guard.is_armed:
+                if now_ns - self._armed_ns >= ARM_AGAIN_NS:  # the node missed the order
+                    self._arm(now_ns)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
+        if self._guard.is_armed and (self._ruling_ns is None or now_ns - self._ruling_ns > RULING_NS):
+            self._guard.disarm(now_ns)
         yield self._output(now_ns)
         self._ticks += 1
         if self._ticks % DIAGNOSTICS_EVERY == 0:
@@ -69,39 +70,30 @@ class GuardNode(Node):
         self._guard.stop(now_ns, bus.StopReason.SHUTDOWN)
         yield self._output(now_ns)
 
-    def _answers(self, action: str) -> bool:
-        return action in GUARD or action in self._absent or action not in self._known
+    def _obey(self, ruling: Supervision, now_ns: int) -> bool:
+        """Take over a ruling; True where it is to reach the bus at once."""
+        guard = self._guard
+        asked = ruling.may_open, ruling.stop_latched, ruling.grace_s > 0.0
+        has_changed, self._obeyed = asked != self._obeyed, asked
+        if not ruling.stop_latched:
+            if guard.stop_reason is not None or guard.is_stop_announced:
+                guard.release_stop(now_ns)
+        else:
+            guard.announce_stop(now_ns, ruling.grace_s)  # without grace: at once
+        if ruling.may_open and not guard.is_armed:
+            self._arm(now_ns)
+        elif guard.is_armed and not ruling.may_open:
+            guard.disarm(now_ns)
+        return has_changed
 
-    def _carry_out(self, request: Request, now_ns: int) -> str:
-        """Do what was asked; the reason if it cannot be done."""
-        if request.action in self._absent:
-            return self._absent[request.action]
-        if request.action not in GUARD:
-            return f"unknown action '{request.action}' (known: {', '.join(sorted(self._known))})"
-        try:
-            GUARD[request.action].read(request)
-        except ArgumentError as error:
-            return str(error)
-        match request.action:
-            case "arm":
-                if not self._guard.arm(now_ns):
-                    return "a stop is latched: release it first"
-            case "disarm":
-                self._guard.disarm(now_ns)
-            case "stop":
-                self._guard.stop(now_ns, bus.StopReason.OPERATOR)
-            case "release":
-                self._guard.release_stop(now_ns)
-        return ""
-
-    def _mode(self, now_ns: int, author: str, reason: str) -> VehicleMode:
-        stopped = self._guard.stop_reason is not None
-        return VehicleMode(now_ns, self.vehicle, self._guard.is_armed, stopped, author, reason)
+    def _arm(self, now_ns: int) -> None:
+        if self._guard.arm(now_ns):
+            self._armed_ns = now_ns
 
     def _output(self, now_ns: int) -> ValveCommand:
         output = self._guard.tick(now_ns)
         arming = next((message for message in output.messages if isinstance(message, bus.Arm)), None)
-        stop = self._guard.stop_reason
+        stop = next((message for message in output.messages if isinstance(message, bus.Stop)), None)
         return ValveCommand(
             now_ns,
             self.vehicle,
@@ -110,6 +102,7 @@ class GuardNode(Node):
             bytes(output.command.on_times_ms),
             output.gate.value,
             output.open_mask,
-            NO_STOP if stop is None else int(stop),
+            NO_STOP if stop is None else int(stop.reason),
+            0.0 if stop is None else stop.grace_s,
             0 if arming is None else 1 + arming.is_armed,
         )

@@ -35,7 +35,7 @@ class ValveSelection(Message):
         counter: Of the selections reported, modulo 16.
         pulse_id: Changes with every new pulse, modulo 16.
         on_time_ms: Per valve, 0 to 127.
-        source: ``stop``, ``brake``, ``operator``, ``controller`` or ``closed``.
+        source: ``brake``, ``operator``, ``controller`` or ``closed``.
         reason: Why this source.
     """
 
@@ -58,7 +58,8 @@ class ValveCommand(Message):
         on_time_ms: Remaining on-time per valve.
         gate: ``open``, or why the valves are closed.
         open_mask: Bit i: valve i is open after this frame.
-        stop_reason: Code of the latched stop, ``NO_STOP`` without one.
+        stop_reason: Code of the latched or announced stop, ``NO_STOP`` without one.
+        stop_grace_s: After this time the valve node is to land by itself; 0 at once.
         arm: 0 nothing to say, 1 disarm the node, 2 arm it.
     """
 
@@ -70,6 +71,7 @@ class ValveCommand(Message):
     gate: Text
     open_mask: U8
     stop_reason: U8
+    stop_grace_s: F64
     arm: U8
 
 
@@ -105,6 +107,7 @@ class ValveStatus(Message):
         floating: The float air is on.
         pressure_pa: Tank pressure, NaN before the first report.
         faults: Fault bits.
+        bus_rate_hz: Frames that arrive from the bus, of all nodes together.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveStatus"
@@ -116,15 +119,4 @@ class ValveStatus(Message):
     floating: Bool
     pressure_pa: F64
     faults: U8
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class VehicleMode(Message):
-    """Armed state and the reason for it; latched."""
-
-    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/VehicleMode"
-    TOPIC: ClassVar = Topic("vehicle_mode", rank=Rank.VALVES, latched=True)
-    armed: Bool
-    stopped: Bool
-    source: Text
-    reason: Text
+    bus_rate_hz: F64

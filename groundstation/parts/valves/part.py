@@ -11,7 +11,7 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import LABORATORY, Rig, check_address
 from groundstation.declarations.vehicle_type import VehicleType
-from groundstation.parts.valves.actions import FLOAT_AIR, GUARD, MULTIPLEXER
+from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.allocation_node import AllocationNode
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.gauges import GAUGES
@@ -23,7 +23,6 @@ from groundstation.parts.valves.messages import (
     ValveDemand,
     ValveSelection,
     ValveStatus,
-    VehicleMode,
 )
 from groundstation.parts.valves.port import ValveBus
 from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
@@ -45,19 +44,12 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
     """With modulators of its own for braking and for pushing by hand."""
     type_ = rig.type_of(vehicle)
     modulators = _modulator(type_), _modulator(type_)
-    return CommandMuxNode(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators, rig.table.keep_in())
+    return CommandMuxNode(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators)
 
 
 def _guard(rig: Rig, vehicle: str) -> Node:
     limits = OpenTimeLimits(max_open_s=rig.type_of(vehicle).valves.max_open_s)
-    guard = Guard(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits)
-    nodes = rig.tables.nodes
-    absent = {
-        row.name: f"this vehicle has no {row.answered_by.replace('_', ' ')}"
-        for row in rig.tables.actions.values()
-        if not {vehicle, ""} & set(nodes[row.answered_by].vehicles(rig))
-    }
-    return GuardNode(vehicle, guard, frozenset(rig.tables.actions), absent)
+    return GuardNode(vehicle, Guard(rig.vehicle(vehicle, ValvesOfVehicle).bus_index, limits))
 
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:
@@ -100,7 +92,7 @@ def _check(rig: Rig) -> None:
 PART = Part(
     name="valves",
     summary="the wrench becomes pulses; one source is chosen, guarded and sent over the valve bus",
-    topics=(CanIn, ValveStatus, VehicleMode, ValveDemand, ValveSelection, ValveCommand, CanOut),
+    topics=(CanIn, ValveStatus, ValveDemand, ValveSelection, ValveCommand, CanOut),
     nodes=(
         NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMuxNode, _command_mux),
         NodeRow("guard", COMMANDS, Weight.URGENT, GuardNode, _guard),
@@ -108,7 +100,7 @@ PART = Part(
         NodeRow("allocation", FLIGHT, Weight.LIGHT, AllocationNode, _allocation),
     ),
     ports=(PortRow("valve_writer", ValveBus, _port, is_of_rig=True),),
-    actions=(*GUARD.values(), *MULTIPLEXER.values(), *FLOAT_AIR.values()),
+    actions=(PUSH,),
     rig=ValvesOfRig,
     vehicle=ValvesOfVehicle,
     check=_check,

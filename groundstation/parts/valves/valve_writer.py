@@ -8,24 +8,36 @@ from drivers.valve_bus.frame import CanFrame
 from drivers.valve_bus.protocol import decode, encode
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
-from groundstation.parts.valves.actions import FLOAT_AIR
+from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
 
 FLOAT_RETRY_NS = 100_000_000
+COUNTED_NS = 500_000_000
+"""Over so long frames are counted."""
+BUTTON_PAUSE_NS = 300_000_000
+"""Stop frames that follow each other faster are one press."""
+
+
+BUTTON = "CAN button"
+"""Author of stop presses that arrive as frames on the valve bus."""
 
 
 class ValveWriter(Node):
-    """Speaks the valve bus for one vehicle; repeats a float-air order until the node reports it."""
+    """Speaks the valve bus for one vehicle; repeats a float-air order until the node reports it.
 
-    inputs = (ValveCommand, CanIn, Request)
-    outputs = (CanOut, ValveStatus, Ack)
+    A stop frame that arrives comes from a button on the bus and counts as a press.
+    """
+
+    inputs = (ValveCommand, CanIn, Supervision)
+    outputs = (CanOut, ValveStatus, StopPress)
 
     def __init__(self, vehicle: str, bus_index: int) -> None:
         super().__init__(vehicle, FLOAT_RETRY_NS)
         self._index = bus_index
         self._wanted_float: bool | None = None
-        self._float_counter = 0
+        self._float_counter = self._presses = 0
+        self._stop_frame_ns = -BUTTON_PAUSE_NS
+        self._frames, self._counted_ns, self._bus_rate_hz = 0, 0, 0.0
         self._floating: bool | None = None
         self._pressure_pa = math.nan
 
@@ -35,15 +47,10 @@ class ValveWriter(Node):
                 yield from self._command(message, now_ns)
             case CanIn():
                 yield from self._received(message, now_ns)
-            case Request() if message.action in FLOAT_AIR:
-                try:
-                    FLOAT_AIR[message.action].read(message)
-                except ArgumentError as error:
-                    yield answer(message, now_ns, str(error))
-                    return
-                self._wanted_float = message.action == "float_on"
-                yield self._float_order(now_ns)
-                yield answer(message, now_ns)
+            case Supervision():
+                was_wanted, self._wanted_float = self._wanted_float, message.air_on
+                if message.air_on is not was_wanted:
+                    yield self._float_order(now_ns)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         if self._wanted_float is not None and self._wanted_float is not self._floating:
@@ -51,15 +58,25 @@ class ValveWriter(Node):
 
     def _command(self, message: ValveCommand, now_ns: int) -> Iterator[Message]:
         if message.stop_reason != NO_STOP:
-            yield self._frame(bus.Stop(self._index, bus.StopReason(message.stop_reason)), now_ns)
+            reason = bus.StopReason(message.stop_reason)
+            yield self._frame(bus.Stop(self._index, reason, message.stop_grace_s), now_ns)
         if message.arm:
             yield self._frame(bus.Arm(self._index, is_armed=message.arm == 2), now_ns)
         command = bus.ValveCommand(self._index, message.counter, message.pulse_id, tuple(message.on_time_ms))
         yield self._frame(command, now_ns)
 
     def _received(self, message: CanIn, now_ns: int) -> Iterator[Message]:
+        self._frames += 1
+        if now_ns - self._counted_ns >= COUNTED_NS:
+            self._bus_rate_hz = self._frames * 1e9 / (now_ns - self._counted_ns)
+            self._frames, self._counted_ns = 0, now_ns
         reported = decode(CanFrame(message.arbitration_id, message.data))
         match reported:
+            case bus.Stop() if reported.vehicle in (self._index, bus.EVERY_VEHICLE):
+                pause_ns, self._stop_frame_ns = now_ns - self._stop_frame_ns, now_ns
+                if pause_ns >= BUTTON_PAUSE_NS:  # a button repeats its frame while it is held
+                    self._presses += 1
+                    yield StopPress(now_ns, self.vehicle, self._presses, f"{BUTTON} of {self.vehicle}")
             case bus.TankPressure() if reported.vehicle == self._index:
                 self._pressure_pa = reported.tank_pa
             case bus.ValveStatus() if reported.vehicle == self._index:
@@ -74,6 +91,7 @@ class ValveWriter(Node):
                     reported.is_float_air_on,
                     self._pressure_pa,
                     reported.node_faults,
+                    self._bus_rate_hz,
                 )
 
     def _float_order(self, now_ns: int) -> CanOut:

@@ -70,7 +70,11 @@ class Run:
     def __init__(self, rig, folder, *words):
         self.recording = folder / "run.mcap"
         self.folder = folder
-        self._env = os.environ | {"XDG_RUNTIME_DIR": str(folder), "OPENBLAS_NUM_THREADS": "1"}
+        self._env = os.environ | {
+            "XDG_RUNTIME_DIR": str(folder),
+            "XDG_STATE_HOME": str(folder / "state"),
+            "OPENBLAS_NUM_THREADS": "1",
+        }
         command = [sys.executable, "-m", "groundstation", "run", str(rig), "--headless"]
         self.process = subprocess.Popen(
             [*command, "--record", str(self.recording), *words],
@@ -142,7 +146,14 @@ class Run:
 
     def request(self, *words):
         """``groundstation request`` to this run."""
-        command = [sys.executable, "-m", "groundstation", "request", *words]
+        return self._call("request", *words)
+
+    def inject(self, *words):
+        """``groundstation inject`` into this run."""
+        return self._call("inject", *words)
+
+    def _call(self, *words):
+        command = [sys.executable, "-m", "groundstation", *words]
         return subprocess.run(command, env=self._env, capture_output=True, text=True, timeout=30, check=False)
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from groundstation.cli.replay import _factory
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.operation.messages import SequencePhase
 from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
@@ -27,7 +27,7 @@ def fly_and(launch, rig, name, number):
     """Fly, send a signal to a process, wait for its return; the run and its new process number."""
     run = launch(rig)
     run.wait_until_flying()
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     run.forget()
     old = run.pids()[name]
     os.kill(old, number)
@@ -45,16 +45,19 @@ def longest_silence_s(payloads):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_without_commands_the_valve_node_closes_and_the_start_sequence_arms_again(launch, two_drawn, number):
+def test_without_commands_the_valve_node_closes_and_the_vehicle_brakes_or_lands_and_flies_again(
+    launch, two_drawn, number
+):
     run, _ = fly_and(launch, two_drawn, "commands", number)
     run.wait_for("commands was ended by SIGKILL; starting it again")
-    run.wait_for("alpha: arming")
+    run.wait_for("alpha: FAULT commands_restarted")
     run.wait_for("alpha: flying")
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     for vehicle in ("alpha", "beta"):
-        phases = [row.phase for row in of(run.recording, SequencePhase, vehicle)]
-        assert phases[-2:] == ["arming", "flying"]
+        modes = [row.mode for row in of(run.recording, Supervision, vehicle)]
+        assert "braking" in modes
+        assert any("commands_restarted" in row.ids for row in of(run.recording, Faults, vehicle))
         assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0  # its loop went on
 
 
@@ -64,7 +67,7 @@ def test_one_vehicles_loop_dies_the_other_flies_on_and_it_flies_again(launch, tw
     run.wait_for("alpha_flight was ended by SIGKILL; starting it again")
     run.wait_for("alpha/imu: open")
     for _ in range(4):
-        run.wait_for("alpha", "flying", "open")
+        run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     assert longest_silence_s(of(run.recording, VehicleState, "alpha")) > 0.5
     assert of(run.recording, VehicleState, "alpha")[-1].status == "flying"
@@ -89,7 +92,7 @@ def test_a_dead_recorder_loses_nothing_that_was_written_and_goes_on_in_another_f
     run, _ = fly_and(launch, two_drawn, "recorder", number)
     run.wait_for("recorder was ended by SIGKILL; starting it again")
     for _ in range(3):
-        run.wait_for("alpha", "flying", "open")
+        run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     second = run.recording.with_stem("run_1")
     assert longest_silence_s(of(second, VehicleState, "alpha")) < 1.0
@@ -109,7 +112,7 @@ def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launc
     run.wait_for("alpha_sky was ended by SIGKILL; starting it again")
     run.wait_for("alpha/star_camera: open")
     for _ in range(4):
-        run.wait_for("alpha", "flying", "open")
+        run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     gap_s = longest_silence_s(of(run.recording, StarFix, "alpha"))
     assert gap_s > 3 / 15, "the sky did not fall silent for even three pictures: was it killed?"
@@ -122,12 +125,12 @@ def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launc
 def test_the_fork_server_may_die_and_what_dies_after_it_is_started_again(launch, two_drawn):
     run, _ = fly_and(launch, two_drawn, "fork_server", signal.SIGKILL)
     run.wait_for("the fork server has ended")
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     run.forget()
     os.kill(run.pids()["alpha_flight"], signal.SIGKILL)
     run.wait_for("alpha_flight was ended by SIGKILL; starting it again")
     run.wait_for("alpha/imu: open")
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     assert longest_silence_s(of(run.recording, VehicleState, "beta")) < 1.0
 
@@ -140,7 +143,7 @@ def test_a_launcher_that_was_paused_does_not_take_its_own_silence_for_that_of_ot
     time.sleep(5.0)  # what a person does with Ctrl-Z and fg
     run.forget()
     os.kill(run.process.pid, signal.SIGCONT)
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     assert run.pids() == before
     assert not any("hangs" in line or "starting it again" in line for line in run.lines)
     assert run.end()[0] == 0
@@ -149,7 +152,7 @@ def test_a_launcher_that_was_paused_does_not_take_its_own_silence_for_that_of_ot
 def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):
     run, old = fly_and(launch, two_drawn, "laboratory", signal.SIGKILL)
     run.wait_for("the laboratory was ended by SIGKILL: starting it again")
-    run.wait_for("rest calibration")
+    run.wait_for("resting")
     run.wait_until_flying()
     assert run.pids()["laboratory"] != old
     assert run.end()[0] == 0
@@ -159,12 +162,12 @@ def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
     run, _ = fly_and(launch, two_drawn, "alpha_flight", signal.SIGKILL)
     run.wait_for("alpha/imu: open")
     for _ in range(3):
-        run.wait_for("alpha", "flying", "open")
+        run.wait_for("alpha", "flying", "armed")
     assert run.request("alpha", "go_to", "-0.5", "-0.1", "10").returncode == 0
     refused = run.request("alpha", "go_to", "5", "0", "0")
     assert refused.returncode == 1
     assert "outside the part of the table" in refused.stdout
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
     assert run.end()[0] == 0
     with Recording(run.recording) as recording:
         rig = parse_rig(recording.info.rig_toml, two_drawn)

@@ -24,8 +24,8 @@ def fly_with(launch, rig, key, address):
 
 def end_well(run):
     """Alpha flies on to the end, and no process died of it."""
-    run.wait_for("alpha", "flying", "open")
-    run.wait_for("alpha", "flying", "open")
+    run.wait_for("alpha", "flying", "armed")
+    run.wait_for("alpha", "flying", "armed")
     assert not any("starting it again" in line or "Traceback" in line for line in run.lines)
     assert run.end()[0] == 0
 

@@ -12,7 +12,7 @@ from groundstation.parts.valves.messages import ValveSelection
 from groundstation.recording.reader import Recording
 
 RIG = Path(__file__).parents[3] / "examples" / "own_package" / "rig.toml"
-FLYING = ("alpha", "flying", "open")
+FLYING = ("alpha", "flying", "armed")
 
 pytestmark = pytest.mark.slow
 

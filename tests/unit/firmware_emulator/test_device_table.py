@@ -1,5 +1,6 @@
 """Contract of the table of devices, and a device that an installed package brings."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -128,6 +129,19 @@ def test_what_stands_in_the_laboratory_can_do_what_its_kind_says():
     for row in EmulatedLaboratory(scenario()).installed:
         assert isinstance(row.device, Receiver) == (row.kind.accepts is not None), row.channel
         assert isinstance(row.device, Camera) == (row.kind.pictures is not None), row.channel
+
+
+def test_a_kind_that_accepts_data_needs_a_device_that_receives(install):
+    def build_deaf(mock_up, config):
+        beeper = build_carried(mock_up, config)
+        return SimpleNamespace(
+            next_ns=beeper.next_ns, next_output_ns=beeper.next_ns, run=beeper.run, take=beeper.take
+        )
+
+    install(beeper=replace(CARRIED, per_vehicle=build_deaf))
+    carrying = {"vehicles": [{"name": "alpha", "beeper": {"period_s": 0.5}}]}
+    with pytest.raises(TypeError, match="'beeper' accepts data but has no method receive"):
+        EmulatedLaboratory(carrying)
 
 
 def test_a_device_of_an_installed_package_has_channels_arrivals_and_an_ear(install):

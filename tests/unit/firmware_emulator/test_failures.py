@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from drivers.imu_block.protocol import encode_identify
 from drivers.valve_bus.protocol import Arm, ValveCommand, encode
 from firmware_emulator.failures import FAILURE_KINDS, Failure, FailureConfig, Failures
 from firmware_emulator.laboratory import EmulatedLaboratory
@@ -63,6 +64,8 @@ def fly(scene, failures, source, *, has_overhead=False):
         arrivals += laboratory.advance(tick * 20 * MS)
         on_times = (30,) * 4 + (0,) * 4 if tick % 5 == 0 else (0,) * 8
         command = ValveCommand(0, tick & 15, (tick // 5) & 15, on_times)
+        if tick % 10 == 0:
+            laboratory.deliver(tick * 20 * MS, "alpha/imu", encode_identify(tick))
         laboratory.deliver(tick * 20 * MS, "valve_bus", encode(command))
     arrivals += laboratory.advance(S)
     return arrivals
@@ -111,6 +114,22 @@ def test_a_failure_of_an_unknown_vehicle_or_valve_is_refused():
         )
     with pytest.raises(ValidationError, match=r"valve .* must lie in 0\.\.7"):
         FailureConfig(kind="leaking_valve", vehicle="alpha", parameters={"valve": 8})
+
+
+@pytest.mark.parametrize(
+    ("kind", "vehicle", "reason"),
+    [
+        ("dead_sky", {"camera": {"source": "none"}}, "has no camera"),
+        ("moved_star", {}, "rendered pictures only, and camera.source is 'fixes'"),
+        ("hidden_discs", {}, "no section 'overhead'"),
+        ("hidden_body", {}, "no section 'motion_capture'"),
+        ("other_imu", {"imu": {"frame_version": 1}}, "reports no serial number"),
+    ],
+)
+def test_a_failure_that_finds_nothing_to_befall_is_refused(kind, vehicle, reason):
+    row = {"kind": kind, "vehicle": "alpha"}
+    with pytest.raises(ValidationError, match=f"failure '{kind}' of 'alpha' cannot happen: .*{reason}"):
+        EmulatedLaboratory({"vehicles": [{"name": "alpha", **vehicle}], "failures": [row]})
 
 
 def test_a_failure_that_ends_before_it_starts_is_refused():

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from drivers.imu_block.protocol import encode_identify
 from drivers.laboratory import FailureEvent, FailureRefused, InjectOrder, encode_order, parse_event
 from drivers.valve_bus.protocol import Arm, ValveCommand, encode
 from firmware_emulator.failures import FAILURE_KINDS
@@ -34,6 +35,8 @@ def fly(laboratory, seconds=3.0, orders=()):
             laboratory.deliver(now_ns + 1, "laboratory", orders[tick])
         on_times = (30,) * 4 + (0,) * 4 if tick % 5 == 0 else (0,) * 8
         command = ValveCommand(0, tick & 15, (tick // 5) & 15, on_times)
+        if tick % 10 == 0:
+            laboratory.deliver(now_ns, "alpha/imu", encode_identify(tick))
         laboratory.deliver(now_ns, "valve_bus", encode(command))
     return arrivals
 
@@ -109,6 +112,12 @@ def test_the_same_failure_twice_is_two():
         (InjectOrder("dead_sky", "alpha", {"valve": 1}), "no parameter 'valve'; it has none"),
         (InjectOrder("leaking_valve", "alpha", {"valve": 1.5}), "valve .* whole number, got 1.5"),
         (InjectOrder("leaking_valve", "alpha", {"fraction": math.nan}), "fraction .* got nan"),
+        (
+            InjectOrder("dead_star", "alpha"),
+            "'dead_star' of 'alpha' cannot happen: .* rendered pictures",
+        ),
+        (InjectOrder("hidden_discs", "alpha"), "cannot happen: the scenario has no section 'overhead'"),
+        (InjectOrder("hidden_body", "alpha"), "cannot happen: the scenario has no section 'motion_capture'"),
         (InjectOrder("dead_sky", "alpha", for_s=0.0), "for_s must be positive"),
         (InjectOrder("dead_sky", "alpha", for_s=-1.0), "for_s must be positive"),
         (InjectOrder("dead_sky", "alpha", for_s=math.nan), "for_s must be positive"),

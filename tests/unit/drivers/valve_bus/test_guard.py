@@ -76,7 +76,7 @@ def test_disarming_closes_what_is_open(flying):
     after = flying.tick()
     assert after.open_mask == 0
     assert after.command.on_times_ms == CLOSED
-    assert after.command.pulse_id != before.command.pulse_id
+    assert after.command.pulse_id == (before.command.pulse_id + 1) % 16
     assert flying.guard.counters.stale_cuts == 0
 
 
@@ -107,7 +107,9 @@ def test_silence_of_100_ms_closes_all(flying):
 
 def test_one_command_after_silence_is_not_yet_a_source(flying):
     flying.tick(200)
+    before = flying.guard.counters.first_after_silence
     assert flying.say(ONE) is Verdict.FIRST_AFTER_SILENCE
+    assert flying.guard.counters.first_after_silence == before + 1
     assert flying.tick().gate is Gate.STALE
     assert flying.say() is Verdict.REFRESHED
     output = flying.tick()
@@ -158,6 +160,21 @@ def test_the_newest_pulse_of_one_tick_wins(flying):
     assert flying.guard.counters.new_pulses == 2
 
 
+def test_pulses_that_each_had_their_tick_superseded_nothing(flying):
+    for _ in range(3):
+        flying.say(ONE)
+        flying.tick()
+    assert flying.guard.counters.superseded_pulses == 0
+
+
+def test_pulse_ids_go_up_by_one_and_round_at_sixteen(flying):
+    ids = []
+    for _ in range(17):
+        flying.say(ONE)
+        ids.append(flying.tick().command.pulse_id)
+    assert ids == [(ids[0] + step) % 16 for step in range(17)]
+
+
 def test_commands_for_others_and_malformed_ones_are_refused(flying):
     guard = flying.guard
     before = guard.counters.commands
@@ -196,6 +213,101 @@ def test_a_released_stop_leaves_the_guard_disarmed(flying):
     assert flying.guard.arm(0)
     flying.say(ONE)
     assert flying.tick().open_mask == 1
+
+
+def test_an_announced_stop_lets_commands_pass_until_its_grace_is_over(flying):
+    start_ms = flying.now_ms
+    flying.guard.announce_stop(start_ms * MS, 0.5)
+    assert flying.guard.is_stop_announced
+    assert flying.guard.stop_reason is None
+    while flying.now_ms < start_ms + 480:
+        flying.say(ONE)
+        output = flying.tick()
+        left_s = (start_ms + 500 - flying.now_ms) / 1000
+        assert output.messages[0] == Stop(1, StopReason.OPERATOR, left_s)
+        assert output.messages[-1] is output.command
+        assert (output.gate, output.open_mask, output.command.on_times_ms) == (Gate.OPEN, 1, ONE)
+        flying.now_ms += 20
+    flying.say(ONE)
+    flying.tick()
+    ns = (start_ms + 500) * MS
+    assert flying.guard.tick(ns - 1).gate is Gate.OPEN
+    assert flying.guard.is_armed
+    last = flying.guard.tick(ns)
+    assert last.messages == (Stop(1, StopReason.OPERATOR), last.command)
+    assert (last.gate, last.open_mask, last.command.on_times_ms) == (Gate.STOPPED, 0, CLOSED)
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert not flying.guard.is_armed
+    assert not flying.guard.is_stop_announced
+    assert flying.guard.counters.stops == 1
+
+
+def test_the_grace_of_a_stop_ends_for_whoever_asks_first(flying):
+    flying.guard.announce_stop(0, 0.1)
+    flying.now_ms = 100
+    flying.say(ONE)  # not a tick
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert flying.tick().open_mask == 0
+
+
+@pytest.mark.parametrize(
+    ("second_s", "over_ms"), [(5.0, 1000), (0.81, 1000), (0.8, 1000), (0.79, 990), (0.1, 300)]
+)
+def test_a_second_announcement_shortens_the_grace_and_never_lengthens_it(flying, second_s, over_ms):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.announce_stop(200 * MS, second_s)
+    assert flying.guard.tick(over_ms * MS - 1).messages[0] == Stop(1, StopReason.OPERATOR, 1e-9)
+    assert flying.guard.tick(over_ms * MS).gate is Gate.STOPPED
+
+
+@pytest.mark.parametrize("grace_s", [0.0, -1.0, float("nan")])
+def test_an_announcement_without_grace_stops_at_once(flying, grace_s):
+    flying.guard.announce_stop(0, grace_s)
+    assert flying.guard.stop_reason is StopReason.OPERATOR
+    assert flying.tick().messages[0] == Stop(1, StopReason.OPERATOR)
+
+
+def test_a_grace_is_at_most_what_the_frame_carries(flying):
+    flying.guard.announce_stop(0, float("inf"))
+    assert flying.guard.tick(0).messages[0] == Stop(1, StopReason.OPERATOR, 25.5)
+
+
+def test_nobody_arms_while_a_stop_is_announced(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.disarm(0)
+    assert not flying.guard.arm(0)
+    output = flying.tick()
+    assert output.messages[:2] == (Stop(1, StopReason.OPERATOR, 1.0), Arm(1, is_armed=False))
+    assert output.gate is Gate.DISARMED
+
+
+def test_a_hard_stop_ends_the_grace(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.stop(0, StopReason.GUARD)
+    flying.guard.announce_stop(0, 1.0)
+    assert flying.guard.stop_reason is StopReason.GUARD
+    assert not flying.guard.is_stop_announced
+    assert flying.tick().messages[0] == Stop(1, StopReason.GUARD)
+
+
+def test_a_released_announcement_leaves_the_guard_disarmed(flying):
+    flying.guard.announce_stop(0, 1.0)
+    flying.guard.release_stop(0)
+    assert not flying.guard.is_armed
+    assert not flying.guard.is_stop_announced
+    output = flying.tick()
+    assert output.messages == (Arm(1, is_armed=False), output.command)
+    assert output.gate is Gate.DISARMED
+    assert flying.guard.tick(2000 * MS).gate is Gate.DISARMED  # and no stop comes later
+    assert flying.guard.arm(2000 * MS)
+
+
+def test_a_clock_that_goes_back_stops_whatever_the_grace(flying):
+    flying.now_ms = 1000
+    flying.guard.announce_stop(flying.now_ms * MS, 5.0)
+    assert flying.tick(-500).gate is Gate.STOPPED
+    assert flying.guard.stop_reason is StopReason.GUARD
+    assert not flying.guard.is_stop_announced
 
 
 def test_a_clock_that_goes_back_stops(flying):
@@ -276,3 +388,42 @@ def test_a_valve_with_no_duty_never_opens(flying):
 def test_senseless_limits_are_refused(limits):
     with pytest.raises(ValueError, match=next(iter(limits))):
         OpenTimeLimits(**limits)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        lambda guard, ns: guard.arm(ns),
+        lambda guard, ns: guard.disarm(ns),
+        lambda guard, ns: guard.stop(ns, StopReason.OPERATOR),
+        lambda guard, ns: guard.announce_stop(ns, 1.0),
+        lambda guard, ns: guard.release_stop(ns),
+        lambda guard, ns: guard.update(ns, ValveCommand(1, 5, 5, ONE)),
+        lambda guard, ns: guard.tick(ns),
+    ],
+)
+def test_a_clock_that_goes_back_is_noticed_by_whatever_asks_first(order):
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    order(guard, 400 * MS)
+    assert guard.counters.clock_went_back == 1
+    assert not guard.is_armed
+
+
+def test_the_guards_own_time_stands_still_while_the_clock_goes_back():
+    guard = Guard(1, WIDE)
+    guard.tick(1000 * MS)
+    assert guard._advance(400 * MS) == 1000 * MS
+    assert guard._advance(450 * MS) == 1050 * MS
+    assert guard._advance(350 * MS) == 1050 * MS
+
+
+def test_half_of_the_counters_values_ahead_is_new_and_more_is_old(flying):
+    assert flying.say(ONE, step=8) is Verdict.NEW_PULSE
+    assert flying.say(ONE, step=9) is Verdict.COUNTER_BACKWARDS
+
+
+def test_what_was_granted_whole_counts_as_clipped_by_nothing(flying):
+    flying.say(ONE)
+    flying.tick()
+    assert (flying.guard.counters.clipped_by_run, flying.guard.counters.clipped_by_duty) == (0, 0)

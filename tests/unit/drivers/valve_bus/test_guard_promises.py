@@ -55,6 +55,7 @@ class GuardedValves(RuleBasedStateMachine):
         self.times = (0,) * 8
         self.advanced_at_ms = []  # commands whose counter stepped forward
         self.is_armed = self.is_stopped = False
+        self.stops_at_ms = None  # announced
         self._say(0)
         if is_armed:
             self.arm()
@@ -64,6 +65,8 @@ class GuardedValves(RuleBasedStateMachine):
         self.guard.update(self.now_ms * MS, ValveCommand(3, counter % 16, self.pulse_id % 16, self.times))
 
     def _tick(self, is_lost=False):
+        if self.stops_at_ms is not None and self.now_ms >= self.stops_at_ms:
+            self.is_armed, self.is_stopped, self.stops_at_ms = False, True, None
         self.last = self.guard.tick(self.now_ms * MS)
         for message in self.last.messages:
             if not is_lost:
@@ -111,7 +114,7 @@ class GuardedValves(RuleBasedStateMachine):
     @rule()
     def arm(self):
         accepted = self.guard.arm(self.now_ms * MS)
-        assert accepted == (not self.is_stopped)
+        assert accepted == (not self.is_stopped and self.stops_at_ms is None)
         self.is_armed = self.is_armed or accepted
         self._tick()
 
@@ -124,12 +127,22 @@ class GuardedValves(RuleBasedStateMachine):
     @rule()
     def stop(self):
         self.guard.stop(self.now_ms * MS, StopReason.OPERATOR)
-        self.is_armed, self.is_stopped = False, True
+        self.is_armed, self.is_stopped, self.stops_at_ms = False, True, None
+        self._tick()
+
+    @rule(grace_ms=st.sampled_from([1, 40, 100, 2000]))
+    def announce_stop(self, grace_ms):
+        self.guard.announce_stop(self.now_ms * MS, grace_ms / 1000)
+        if not self.is_stopped:
+            over_ms = self.now_ms + grace_ms
+            self.stops_at_ms = over_ms if self.stops_at_ms is None else min(self.stops_at_ms, over_ms)
         self._tick()
 
     @rule()
     def release(self):
         self.guard.release_stop(self.now_ms * MS)
+        if self.stops_at_ms is not None:
+            self.is_armed, self.stops_at_ms = False, None
         self.is_stopped = False
         self._tick()
 
@@ -139,6 +152,7 @@ class GuardedValves(RuleBasedStateMachine):
         assert self.guard.stop_reason is not None
         self.guard.release_stop(self.now_ms * MS)
         self.is_armed = self.is_stopped = False
+        self.stops_at_ms = None
         self.advanced_at_ms.clear()
         self._tick()
 
@@ -148,6 +162,14 @@ class GuardedValves(RuleBasedStateMachine):
         if self.is_stopped or not self.is_armed or not received:
             assert self.last.open_mask == 0
             assert self.last.gate is not Gate.OPEN
+
+    @invariant()
+    def the_bus_carries_the_stop_first_and_what_is_left_of_its_grace(self):
+        first = self.last.messages[0]
+        assert isinstance(first, Stop) == (self.is_stopped or self.stops_at_ms is not None)
+        if isinstance(first, Stop):
+            left_ms = 0 if self.stops_at_ms is None else self.stops_at_ms - self.now_ms
+            assert round(first.grace_s * 1e9) == left_ms * MS
 
     @invariant()
     def no_run_of_a_valve_is_longer_than_allowed(self):

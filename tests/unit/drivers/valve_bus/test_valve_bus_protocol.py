@@ -33,10 +33,11 @@ from drivers.valve_bus.protocol import (
 VEHICLES = st.integers(0, 14)
 NIBBLES = st.integers(0, 15)
 BYTES = st.integers(0, 255)
+GRACES_S = BYTES.map(lambda steps: steps / 10)
 FLAGS = st.booleans()
 
 MESSAGES = st.one_of(
-    st.builds(Stop, st.integers(0, EVERY_VEHICLE), BYTES),
+    st.builds(Stop, st.integers(0, EVERY_VEHICLE), BYTES, GRACES_S),
     st.builds(Arm, VEHICLES, FLAGS, BYTES),
     st.builds(FloatAir, VEHICLES, FLAGS, NIBBLES),
     st.builds(ValveCommand, VEHICLES, NIBBLES, NIBBLES, st.tuples(*[st.integers(0, 127)] * 8)),
@@ -52,8 +53,10 @@ MESSAGES = st.one_of(
         FLAGS,
         FLAGS,
         BYTES,
+        st.integers(0, 63),
         BYTES,
-        BYTES,
+        FLAGS,
+        FLAGS,
     ),
     st.builds(
         Heartbeat,
@@ -94,12 +97,17 @@ def test_a_missing_sensor_reads_as_nan():
 
 WORKED_EXAMPLES = {  # bit by bit in docs/interfaces/valve_bus.md
     Stop(EVERY_VEHICLE, StopReason.OPERATOR): (0x00F, "01"),
+    Stop(1, StopReason.OPERATOR, 4.5): (0x001, "012d"),
     Arm(1, is_armed=True): (0x041, "01a5"),
     FloatAir(1, is_on=True, counter=7): (0x081, "71"),
     ValveCommand(1, 3, 5, (10, 0, 127, 0, 0, 50, 0, 1)): (0x101, "530ac01f00900102"),
     ValveStatus(1, 0b10000001, 3, 5, 9, True, False, False, True, 0, NodeFault.WATCHDOG_RESET, 2): (
         0x181,
         "815399000802",
+    ),
+    ValveStatus(1, 0, 3, 5, 10, False, True, False, False, 0, NodeFault.SUPPLY_UNDERVOLTAGE, 0, True, True): (
+        0x181,
+        "0053a200c100",
     ),
     TankPressure(1, 20e6, 600e3, 293.15): (0x201, "204e70178372"),
     Heartbeat(1, 123456, NodeState.ARMED, (1, 2), 3): (0x281, "40e2010002010203"),
@@ -133,6 +141,31 @@ def test_a_stop_identifier_stops_whatever_its_bytes(data, vehicle):
     assert isinstance(decode(CanFrame(STOP_ID + vehicle, data)), Stop)
 
 
+@pytest.mark.parametrize(
+    ("data", "grace_s"),
+    [("", 0.0), ("01", 0.0), ("0100", 0.0), ("0101", 0.1), ("01ff", 25.5), ("01030901", 0.3)],
+)
+def test_a_stop_without_its_second_byte_has_no_grace(data, grace_s):
+    assert decode(CanFrame(STOP_ID + 4, bytes.fromhex(data))).grace_s == grace_s
+
+
+@pytest.mark.parametrize(
+    ("grace_s", "byte"),
+    [(1e-9, 1), (0.1, 1), (0.1000001, 2), (0.3, 3), (0.31, 4), (2.0, 20), (25.5, 255)],
+)
+def test_a_grace_is_rounded_up_to_whole_steps(grace_s, byte):
+    """Down, a short one would read as a stop at once."""
+    assert encode(Stop(0, StopReason.GUARD, grace_s)).data == bytes((2, byte))
+
+
+@given(st.integers(1, 255))
+def test_the_grace_on_the_wire_is_what_the_dbc_says(steps):
+    frame = encode(Stop(0, 1, steps / 10))
+    signals = database().get_message_by_frame_id(STOP_ID).decode(frame.data)
+    assert signals["Grace"] == pytest.approx(decode(frame).grace_s, abs=1e-12)
+    assert frame.data[1] == steps
+
+
 def test_stop_outranks_every_other_message_of_every_vehicle():
     others = (ARM_ID, FLOAT_AIR_ID, COMMAND_ID, STATUS_ID, PRESSURE_ID, HEARTBEAT_ID)
     assert min(others) > STOP_ID + EVERY_VEHICLE
@@ -155,6 +188,11 @@ def test_foreign_short_and_impossible_frames_say_why():
         ValveCommand(15, 0, 0, (0,) * 8),
         Stop(16),
         Stop(0, 256),
+        Stop(0, 1, -0.1),
+        Stop(0, 1, 25.6),
+        Stop(0, 1, math.nan),
+        Stop(0, 1, math.inf),
+        ValveStatus(0, 0, 0, 0, 0, False, False, False, False, 0, 64),
         TankPressure(0, 1e9, 0.0),
         TankPressure(0, 0.0, -1.0),
         Heartbeat(0, -1, NodeState.ARMED),

@@ -5,7 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_emulator.plant.thrusters import FAR_FUTURE_NS, GasSupply, Nozzle, ThrusterBank, ValveTiming
+from firmware_emulator.plant.thrusters import (
+    FAR_FUTURE_NS,
+    BankFailures,
+    GasSupply,
+    Nozzle,
+    ThrusterBank,
+    ValveTiming,
+)
 
 MS = 1_000_000
 STEADY = ValveTiming(open_sd_s=0.0)
@@ -100,7 +107,9 @@ def test_thrust_fades_when_the_tank_is_below_the_regulator():
 
 def test_stuck_and_leaking_valves_do_what_their_names_say():
     thrusters = bank(3)
-    thrusters.set_failures(stuck_open={0}, stuck_closed={1}, leaks={2: 0.1})
+    thrusters.set_failures(
+        BankFailures(stuck_open=frozenset({0}), stuck_closed=frozenset({1}), leaks={2: 0.1})
+    )
     thrusters.energise(0, 1)
     run(thrusters, 200 * MS)
     assert thrusters.wrench[0] == pytest.approx(0.22 * (1.0 + 0.1) * 0.97**0.1, rel=1e-6)

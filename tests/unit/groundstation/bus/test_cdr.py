@@ -5,7 +5,8 @@ import struct
 import numpy as np
 import pytest
 
-from groundstation.bus.cdr import Codec, CodecError, ros_fields
+from groundstation.bus.cdr import Codec, CodecError, codec_of, ros_fields, stamp_of
+from groundstation.declarations.errors import NodeError
 from groundstation.parts.stars.messages import StarSpots
 from groundstation.parts.valves.messages import CanIn
 
@@ -22,7 +23,7 @@ def test_an_array_of_another_precision_is_refused():
     # it would replay as other numbers than the node next door was given
     kinds = {"float32[]": np.zeros(2), "string": ""}
     spots = StarSpots(0, "alpha", *(kinds.get(kind, 0) for _, kind in ros_fields(StarSpots)))
-    with pytest.raises(TypeError, match="u_px: expected float32, found float64"):
+    with pytest.raises(NodeError, match=r"StarSpots.*u_px: expected float32, found float64"):
         Codec(StarSpots).encode(spots)
 
 
@@ -40,5 +41,13 @@ def test_more_bytes_than_a_message_are_refused_but_padding_is_not():
 
 
 def test_a_time_beyond_ros_is_refused():
-    with pytest.raises(struct.error):
+    with pytest.raises(NodeError, match=r"CanIn.*does not fit its fields"):
         Codec(CanIn).encode(CanIn(2**31 * 10**9, "alpha", 2, b""))
+
+
+def test_the_stamp_alone_can_be_read_of_any_message():
+    data = codec_of(CanIn).encode(CanIn(12_345_678_901, "", 0x181, b"abc"))
+    assert stamp_of(data) == 12_345_678_901
+    for garbled in (data[:11], b"\x00\x00" + data[2:], b""):
+        with pytest.raises(CodecError):
+            stamp_of(garbled)

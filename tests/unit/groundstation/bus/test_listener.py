@@ -6,12 +6,12 @@ from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.listener import Decoder, Remote
 from groundstation.parts.control.messages import Wrench
-from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.valves.messages import CanIn
 
-PAYLOADS = {kind.TOPIC.noun: kind for kind in (CanIn, SequencePhase, Wrench)}
+PAYLOADS = {kind.TOPIC.noun: kind for kind in (CanIn, CalibrationInUse, Wrench)}
 WRENCH = Wrench(7, "alpha", 0.1, -0.2, 0.0, 0.0, 0.0, 0.03)
-ARMED = SequencePhase(7, "alpha", "armed", "")
+ARMED = CalibrationInUse(7, "alpha", "imu", "", "")
 
 
 def remote(payload, owner="alpha", sequence=3, publish_ns=9) -> Remote:

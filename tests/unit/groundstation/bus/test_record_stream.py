@@ -51,6 +51,12 @@ def test_batches_give_back_what_was_put_in_with_costs_and_causes(batches):
         assert list(read_batch(packed)) == [as_recorded(*each) for each in sent]
 
 
+@given(messages, st.sets(NOUNS))
+def test_of_some_topics_the_messages_are_those_of_all_without_the_others(sent, nouns):
+    wanted = [as_recorded(*each) for each in sent if each[0].topic.noun in nouns]
+    assert list(read_batch(batch_of(sent), nouns)) == wanted
+
+
 @given(messages, st.data())
 def test_a_batch_cut_anywhere_is_refused_before_anything_of_it_is_taken(sent, data):
     packed = batch_of(sent)

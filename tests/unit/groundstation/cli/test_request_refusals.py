@@ -28,10 +28,15 @@ def refused(capsys, *words):
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["alpha", "fly"], "there is no action 'fly' (there are arm, "),
+        (["alpha", "jump"], "there is no action 'jump' (there are fly, "),
         (["alpha", "go_to", "0.1"], "go_to takes x_m y_m heading_deg, found 1 words"),
         (["alpha", "go_to", "-0.1", "nan", "3"], "finite"),
         (["alpha", "stop"], "no rig is running"),
+        (["all", "stop"], "no rig is running"),
+        (["all", "fly"], "no rig is running"),
+        (["all", "stop", "now"], "stop takes no arguments, found 1 words"),
+        (["all", "go_to", "0", "0", "0"], "go_to is asked of one vehicle; all can be asked to stop, land, "),
+        (["all", "push", "0", "0", "0", "1"], "push is asked of one vehicle; all can be asked to stop, "),
         (["alpha", "stop", "--pid", "1"], "no rig is running with process 1"),
     ],
 )

@@ -13,16 +13,19 @@ from groundstation.declarations.topic import Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rain(Message):
+    ROS_TYPE: ClassVar[str] = "test/msg/Rain"
     TOPIC: ClassVar = Topic("rain")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OtherRain(Message):
+    ROS_TYPE: ClassVar[str] = "test/msg/Rain"
     TOPIC: ClassVar = Topic("rain")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RivalOfTheJournal(Message):
+    ROS_TYPE: ClassVar[str] = "test/msg/Rival"
     TOPIC: ClassVar = Topic("journal")
 
 

@@ -129,5 +129,8 @@ def test_a_recording_that_a_full_disk_lets_nobody_begin_leaves_no_file(tmp_path)
         [sys.executable, "-c", script, str(tmp_path / "run.mcap")], capture_output=True, text=True
     )
     assert ended.returncode == 1
-    assert ended.stderr.splitlines()[-1] == "OSError: [Errno 27] File too large"
+    assert ended.stderr.splitlines()[-1] == (
+        "groundstation.recording.errors.RecordingError: "
+        f"{tmp_path / 'run.mcap.part'} cannot be written any further: File too large"
+    )
     assert list(tmp_path.iterdir()) == []

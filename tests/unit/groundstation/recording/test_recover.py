@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import struct
 import tempfile
 from pathlib import Path
@@ -17,9 +18,11 @@ from mcap.writer import CompressionType, Writer
 
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.ros_schema import ENCODING, schema_text
+from groundstation.cli.main import call
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.parts.table import installed_tables
 from groundstation.recording.errors import RecordingError
+from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
@@ -210,3 +213,56 @@ def test_a_torn_or_garbled_file_is_read_or_refused_in_one_sentence(tmp_path, who
             list(recording.messages(EVERYTHING))
 
     check()
+
+
+@pytest.mark.parametrize("broken_chunks", [{0}, {1}, {1, 2}, {0, 2}, {-1}], ids=str)
+def test_what_was_left_out_is_stated_in_the_recovered_file_for_good(tmp_path, whole, broken_chunks, capsys):
+    ends, spans = chunk_ends(whole), chunk_spans(whole)
+    places = {number % len(ends) for number in broken_chunks}
+    broken = bytearray(whole)
+    for number in places:
+        broken[ends[number] - 40] ^= 0x10
+    report, target = recovered(tmp_path, bytes(broken))
+    assert sum(gap.chunks for gap in report.gaps) == report.damaged_chunks == len(places)
+    runs = sorted(number for number in places if number - 1 not in places)
+    assert len(report.gaps) == len(runs)
+    for gap, first in zip(report.gaps, runs, strict=True):
+        last = first + gap.chunks - 1
+        assert gap.after_ns == (spans[first - 1][1] if first else None)
+        assert gap.before_ns == (spans[last + 1][0] if last + 1 < len(spans) else None)
+    with Recording(target) as recording:
+        assert recording.gaps == tuple(report.gaps)
+        sentences = recording.missing()
+    assert call(["recording", "info", str(target)]) == 0
+    shown = capsys.readouterr().out
+    assert all(sentence in shown for sentence in sentences)
+    again = tmp_path / "again.mcap"
+    recover(target, again)
+    with Recording(again) as recording:
+        assert recording.missing() == sentences
+
+
+def test_a_recording_without_gaps_states_none(tmp_path, whole):
+    _, target = recovered(tmp_path, whole)
+    with Recording(target) as recording:
+        assert recording.gaps == ()
+    assert GAPS_NAME.encode() not in target.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("gap", "sentence"),
+    [
+        (Gap(1, 8_200_000_000, 8_500_000_000), "1 damaged chunk was left out between 3.2 s and 3.5 s:"),
+        (Gap(2, None, 8_500_000_000), "2 damaged chunks were left out before 3.5 s: what was in them is"),
+        (Gap(1, 8_200_000_000, None), "1 damaged chunk was left out after 3.2 s: what was in it is missing"),
+        (Gap(3, None, None), "3 damaged chunks were left out and nothing else was there: what was in them"),
+    ],
+)  # fmt: skip
+def test_a_gap_is_one_sentence(gap, sentence):
+    assert gap.sentence(5_000_000_000).startswith(sentence)
+
+
+@pytest.mark.parametrize("text", ["{", "5", "[5]", "[[1, 2]]", '[["a", 1, 2]]', "[[1, 2, 3, 4]]"])
+def test_gaps_that_cannot_be_read_are_refused(text):
+    with pytest.raises(RecordingError, match=re.escape("groundstation.gaps")):
+        from_metadata({"gaps": text})

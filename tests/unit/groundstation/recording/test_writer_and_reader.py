@@ -13,7 +13,7 @@ from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.bus.record_stream import RecordWriter, read_batch
 from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.parts.control.messages import Wrench
-from groundstation.parts.operation.messages import SequencePhase
+from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.table import installed_tables
 from groundstation.recording.channel_names import channel_name, parse_channel
 from groundstation.recording.errors import RecordingError
@@ -275,13 +275,13 @@ def batch_of(messages):
 
 
 def test_a_latched_message_that_a_batch_repeats_is_written_once(tmp_path):
-    phase = SequencePhase(5, "alpha", "resting", "")
-    published = [Delivered(Envelope(SequencePhase.TOPIC, "alpha", number, 5), phase) for number in (1, 2)]
+    phase = CalibrationInUse(5, "alpha", "imu", "", "")
+    published = [Delivered(Envelope(CalibrationInUse.TOPIC, "alpha", number, 5), phase) for number in (1, 2)]
     with Recorder(tmp_path / "a.mcap", EVERYTHING) as recorder:
         for message in (published[0], published[0], published[1], published[1]):
             assert recorder.record_batch(batch_of([message]), PAYLOADS) == 0
     with Recording(tmp_path / "a.mcap") as recording:
-        assert [found.envelope.sequence for found in recording.messages([SequencePhase])] == [1, 2]
+        assert [found.envelope.sequence for found in recording.messages([CalibrationInUse])] == [1, 2]
 
 
 def test_what_a_witness_records_again_is_written_once_and_what_only_it_has_is_kept(tmp_path):

@@ -74,7 +74,7 @@ def test_what_arrives_from_outside_names_its_port():
 
 
 def test_latched_topics_and_those_that_come_by_event_say_so():
-    assert row_of(None, "sequence_phase").cells()[2] == "latched"
+    assert row_of(None, "faults").cells()[2] == "latched"
     assert row_of(None, "can_in").cells()[2] in {"by event", f"{row_of(None, 'can_in').rate_hz:g}/s"}
     assert row_of(None, "request").cells()[2] == "by event"
 

@@ -68,12 +68,12 @@ def test_nodes_of_several_vehicles_may_share_a_process():
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
-        ("[nodes.spot_finer]\nbusy_s = 0.1\n", "nodes.spot_finer: no such node (there are command_mux, "),
+        ("[nodes.spot_finer]\nbusy_s = 0.1\n", "nodes.spot_finer: no such node (there are supervisor, "),
         (
             '[nodes.spot_finder]\nprocess = "{vehicle}_flight"\n',
             "process 'alpha_flight' holds spot_finder, which is heavy, beside ",
         ),
-        ('[nodes.start_sequence]\nprocess = "alpha"\n', "'alpha' names both a vehicle and a process"),
+        ('[nodes.failure_desk]\nprocess = "alpha"\n', "'alpha' names both a vehicle and a process"),
         ("[nodes.fusion]\nbusy_s = 0.1\nlate_s = 0.1\n", "nodes.fusion: give either 'busy_s' or 'late_s'"),
     ],
 )

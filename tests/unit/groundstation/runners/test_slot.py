@@ -4,6 +4,7 @@ import pytest
 
 from groundstation.bus.envelope import Cause, Delivered, Envelope
 from groundstation.bus.journal import Entry, Journal, JournalWriter, Kind, read_entries
+from groundstation.declarations.errors import NodeError
 from groundstation.declarations.node import Node
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
@@ -175,7 +176,7 @@ def test_a_message_that_is_not_among_a_nodes_outputs_is_refused_by_name():
     class Wrong(Follower):
         outputs = (Diagnostics,)
 
-    with pytest.raises(TypeError, match="alpha/follower published Wrench, which is not among its outputs"):
+    with pytest.raises(NodeError, match="alpha/follower published Wrench, which is not among its outputs"):
         slot_of(Wrong()).tick(5)
 
 

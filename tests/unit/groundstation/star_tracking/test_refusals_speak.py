@@ -1,6 +1,7 @@
 """A frame without a fix: the reason, the picture and the stars that it should show."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from drivers.star_camera.exposure import ExposureDelay
 from groundstation.declarations.request import Ack, Request
 from groundstation.declarations.rig_file import RigFile
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.stars.messages import StarFix, StarImage, StarMatches, StarPicture
+from groundstation.parts.stars.messages import StarFix, StarImage, StarMatches, StarPicture, StarSpots
 from groundstation.parts.stars.picture_keeper import PictureKeeper
 from groundstation.parts.stars.spot_finder import SpotFinder
 from groundstation.parts.stars.star_answers import notes_of
@@ -142,11 +143,11 @@ def test_streaks_are_called_blurred_with_and_without_a_known_motion(tmp_path, pa
 
 
 def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
-    image = painter.paint(np.random.default_rng(5), POSE)
-    assert StarMatches not in sky.show(image)
+    images = [painter.paint(np.random.default_rng(seed), POSE) for seed in (5, 6, 7)]
+    assert StarMatches not in sky.show(images[0])
     (ack,) = sky.tell(Request(sky.stamp_ns, "alpha", 7, "me", "picture", ""))[Ack]
     assert ack.accepted
-    reported = sky.show(image)
+    reported = sky.show(images[1])
     (fix,), (matches,) = reported[StarFix], reported[StarMatches]
     notes = notes_of(matches)
     assert notes.basis == "fix"
@@ -156,7 +157,7 @@ def test_a_fix_is_shown_on_request_with_every_matched_star(sky, painter):
     gap = np.hypot(*(notes.star_px[seen] - notes.spot_px[notes.spot_of_star[seen]]).T)
     assert gap.max() < 0.5
     assert StarPicture in reported
-    assert StarMatches not in sky.show(image)
+    assert StarMatches not in sky.show(images[2])
 
 
 def test_a_picture_that_is_no_longer_held_is_not_said(sky, painter):
@@ -206,3 +207,20 @@ def test_a_frame_that_cannot_be_used_is_refused_in_words(sky, image, words):
     assert not fix.fix
     assert words in fix.reason
     assert "\n" not in fix.reason
+
+
+def test_a_picture_that_comes_again_is_no_fix_and_its_spots_are_none_either(sky, painter):
+    image = painter.paint(np.random.default_rng(5), POSE)
+    first = sky.show(image)
+    assert first[StarFix][0].fix
+    again = sky.show(image)
+    (refused,) = again[StarFix]
+    assert not refused.fix
+    assert refused.reason == "frozen picture: it repeats the one of 0.07 s before byte for byte"
+    (spots,) = first[StarSpots]
+    repeated = sky.tell(replace(spots, stamp_ns=sky.stamp_ns + PERIOD_NS))
+    (refused,) = repeated[StarFix]
+    assert not refused.fix
+    assert refused.reason.startswith("the spots repeat:")
+    moved = replace(spots, stamp_ns=sky.stamp_ns + 2 * PERIOD_NS, u_px=spots.u_px + np.float32(1e-3))
+    assert sky.tell(moved)[StarFix][0].fix

@@ -16,18 +16,19 @@ from groundstation.parts.fusion import gauges as fusion
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus, VehicleState
 from groundstation.parts.imu import gauges as imu
 from groundstation.parts.imu.messages import Imu, ImuBytes
-from groundstation.parts.operation import gauges as operation
-from groundstation.parts.operation.messages import Diagnostics, Latency, SequencePhase
+from groundstation.parts.operation.messages import Diagnostics, Latency
 from groundstation.parts.overhead import gauges as overhead
 from groundstation.parts.overhead.messages import FixComparison
 from groundstation.parts.reference import gauges as reference
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars import gauges as stars
 from groundstation.parts.stars.messages import SkyChange, StarFix, StarSpots
+from groundstation.parts.supervision import gauges as supervision
+from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves import gauges as valves
 from groundstation.parts.valves import messages as v
 
-_VALVES = (v.ValveStatus, v.VehicleMode, v.ValveDemand, v.ValveSelection, v.ValveCommand, v.CanOut)
+_VALVES = (v.ValveStatus, v.ValveDemand, v.ValveSelection, v.ValveCommand, v.CanOut)
 _ZEROS = {"string": "", "bool": False, "uint8[]": b"", "float32[]": np.empty(0, np.float32)}
 
 
@@ -41,6 +42,8 @@ def _message(kind, vehicle="alpha", stamp_ns=0, **known):
 def _zero(ros):
     if ros in _ZEROS:
         return _ZEROS[ros]
+    if ros == "string[]":
+        return ()
     if ros.endswith("]"):
         length = ros.partition("[")[2].rstrip("]")
         return (0.0,) * int(length or 0)
@@ -106,9 +109,9 @@ def tables():
             Part(
                 "operation",
                 "",
-                topics=(Request, Ack, SequencePhase, Diagnostics, Latency),
-                gauges=operation.GAUGES,
+                topics=(Request, Ack, Diagnostics, Latency),
             ),
+            Part("supervision", "", topics=(Supervision, Faults), gauges=supervision.GAUGES),
             Part(
                 "reference",
                 "",

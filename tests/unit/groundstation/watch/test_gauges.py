@@ -9,10 +9,11 @@ from groundstation.declarations.view import Level
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus, VehicleState
 from groundstation.parts.imu.messages import Imu
-from groundstation.parts.operation.messages import Diagnostics, SequencePhase
+from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars.messages import SkyChange, StarFix
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus, VehicleMode
+from groundstation.parts.supervision.messages import Faults, Supervision
+from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
 from groundstation.watch.monitor import Monitor
 
 SECOND_NS = 1_000_000_000
@@ -59,7 +60,8 @@ def fix(watched, second, reason=""):
 
 def test_the_rows_stand_in_their_order(watched):
     assert watched.monitor.vehicles["alpha"].labels() == (
-        "phase",
+        "mode",
+        "faults",
         "valves",
         "commanded by",
         "position, heading",
@@ -114,7 +116,7 @@ def test_what_is_not_known_yet_is_a_dash(watched):
 
 def test_the_line_of_a_log_has_fixed_columns(watched):
     before = watched.line()
-    watched.give(SequencePhase, 1, phase="flying", detail="goal reached")
+    watched.give(Supervision, 1, mode="flying", cause="every check passed")
     watched.give(ValveCommand, 1, gate="open")
     watched.give(VehicleState, 1, position_table_m=(1.25, -0.5), heading_rad=math.pi / 2, status="flying")
     watched.give(ControlStatus, 1, goal_position_table_m=(1.25, -0.496), goal_heading_rad=math.pi / 2)
@@ -123,7 +125,7 @@ def test_the_line_of_a_log_has_fixed_columns(watched):
     watched.give(FusionStatus, 1, fixes_used=5, fixes_refused=1, fix_age_s=0.125)
     fix(watched, 1)
     assert watched.line() == (
-        "flying            open        1250.0   -500.0 mm   90.00 deg  off    4.0 mm   0.00 deg  "
+        "flying     no faults  armed       1250.0   -500.0 mm   90.00 deg  off    4.0 mm   0.00 deg  "
         "est  1.00 mm 0.000 deg  imu   0/s lost 2  fix  0.3/s age 0.12 s used 5 refused 1"
     )
     first = "position, heading"
@@ -131,17 +133,16 @@ def test_the_line_of_a_log_has_fixed_columns(watched):
 
 
 def test_levels_say_what_is_bad(watched):
-    watched.give(SequencePhase, 1, phase="stopped")
-    watched.give(VehicleMode, 1, armed=True)
+    watched.give(Supervision, 1, mode="stopped", cause="stopped", author="operator")
     watched.give(ValveCommand, 1, gate="stopped")
     watched.give(ValveStatus, 1, open_mask=0b101, dead_man=True, pressure_pa=3e7)
     watched.give(ValveSelection, 1, source="brake", reason="no command")
     watched.give(VehicleState, 1, status="lost")
     watched.give(Imu, 1, reason="frozen", frames_lost=3)
     cells = watched.cells()
-    assert cells["phase"].pieces == (("stopped", Level.BAD),)
+    assert cells["mode"].pieces == (("stopped (stopped, by operator)", Level.BAD),)
     assert cells["valves"].pieces == (
-        ("armed, stopped ", Level.WARNING),
+        ("stopped ", Level.WARNING),
         ("●·●·····", Level.PLAIN),
         (" dead man", Level.BAD),
     )
@@ -165,7 +166,7 @@ def test_fixes_are_counted_by_what_became_of_them(watched):
 def test_station_keeping_is_measured_to_the_setpoint_while_flying(watched):
     watched.give(ControlStatus, 1, goal_position_table_m=(1.0, 2.0), goal_heading_rad=3.1)
     watched.give(ReferenceState, 1, position_table_m=(9.0, 9.0))  # not flying yet
-    watched.give(SequencePhase, 2, phase="flying")
+    watched.give(Supervision, 2, mode="flying")
     watched.give(ReferenceState, 3, position_table_m=(1.003, 2.004), heading_rad=-3.1)
     assert watched.row("  rms of 30 s, by truth") == "    5.00 mm    4.766 deg"
     watched.give(ReferenceState, 40, position_table_m=(1.001, 2.0), heading_rad=3.1)  # the first is too old
@@ -178,11 +179,31 @@ def test_the_estimate_is_carried_to_the_moment_of_the_truth(watched):
     assert watched.row("estimate, rms by truth") == "    2.00 mm    0.000 deg"
 
 
-def test_phases_and_refused_requests_are_events(watched):
-    watched.give(SequencePhase, 1, phase="resting", detail="10 s")
+def test_modes_and_refused_requests_are_events(watched):
+    for _ in range(2):
+        watched.give(Supervision, 1, mode="resting", cause="flight is wanted", author="ann")
     watched.give(Ack, 2, action="arm", accepted=True)
     watched.give(Ack, 3, action="go_to", accepted=False, reason="off the table")
-    assert watched.monitor.take_lines() == ["alpha: resting (10 s)", "alpha: go_to refused: off the table"]
+    assert watched.monitor.take_lines() == [
+        "alpha: resting (flight is wanted, by ann)",
+        "alpha: go_to refused: off the table",
+    ]
+
+
+def test_faults_are_shown_until_they_clear_and_are_events(watched):
+    row = {"ids": ("tank_low",), "whats": ("The tank is nearly empty.",), "details": ("20 bar",)}
+    more = {"since_ns": (0.0,), "responses": ("brakes, then lands",), "advices": ("Fill it.",)}
+    watched.give(Faults, 1)
+    assert watched.row("faults") == "none"
+    watched.give(Faults, 2, **row, **more, gone_ns=(0.0,))
+    assert watched.row("faults") == "tank_low (2 s, brakes, then lands)"
+    watched.give(Faults, 3, **row, **more, gone_ns=(2e9,))
+    assert watched.row("faults") == "tank_low (gone, release clears it)"
+    watched.give(Faults, 4)
+    assert watched.monitor.take_lines() == [
+        "alpha: FAULT tank_low: The tank is nearly empty. (20 bar) It brakes, then lands. Fill it.",
+        "alpha: fault tank_low is gone; release clears it",
+    ]
 
 
 def test_a_silent_line_and_one_of_noise_are_reported_until_samples_come(watched):

@@ -10,8 +10,9 @@ from groundstation.declarations.view import Gauge, GaugeRow, cell
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.imu.messages import Imu
-from groundstation.parts.operation.messages import Diagnostics, SequencePhase
+from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.stars.messages import StarFix
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import CanIn, ValveCommand, ValveStatus
 from groundstation.watch import monitor as monitor_module
 from groundstation.watch import vehicle_monitor
@@ -75,7 +76,7 @@ def test_rates_count_what_is_not_decoded_and_fall_to_zero(tables, message, deliv
 def test_the_record_stream_shows_what_delivered_messages_show(tables, message, delivered, recorded):
     streamed, direct = Monitor(tables, ("alpha",)), Monitor(tables, ("alpha",))
     payloads = [
-        message(SequencePhase, phase="flying"),
+        message(Supervision, mode="flying", cause="it floats"),
         message(VehicleState, position_table_m=(1.0, 2.0), status="flying", fix_stamp_ns=3),
         message(FusionStatus, fixes_used=4, fix_age_s=0.2),
         message(StarFix, reason="too few stars: 1", stamp_ns=3),
@@ -86,7 +87,7 @@ def test_the_record_stream_shows_what_delivered_messages_show(tables, message, d
         one = delivered(payload, number, 10 * number)
         streamed.take(recorded(one), number)
         direct.take_delivered(one, number)
-    assert streamed.take_lines() == direct.take_lines() == ["alpha: flying", "alpha/imu: gone"]
+    assert streamed.take_lines() == direct.take_lines() == ["alpha: flying (it floats)", "alpha/imu: gone"]
     assert streamed.vehicles["alpha"].rows(9) == direct.vehicles["alpha"].rows(9)
     assert streamed.vehicles["alpha"].line(9) == direct.vehicles["alpha"].line(9)
     assert streamed.summarise_latency(9)[0].p50_s[4] == pytest.approx(17e-9)  # the state
@@ -138,29 +139,29 @@ def test_garbled_messages_are_counted_and_reported_once_per_topic(tables, messag
     monitor = Monitor(tables, ("alpha",))
     monitor.take(recorded(delivered(message(Imu, frames_lost=5, valid=True))), 0)
     assert row(monitor, "IMU").endswith("5 lost")
-    for kind in (SequencePhase, SequencePhase, Imu):
+    for kind in (Supervision, Supervision, Imu):
         one = recorded(delivered(message(kind)))
         monitor.take(one._replace(data=one.data[:-3]), 0)
     assert row(monitor, "IMU").endswith("5 lost")  # the value before stays
     assert monitor.undecodable == 3
     lines = monitor.take_lines()
     assert [line.partition(" cannot")[0] for line in lines] == [
-        "a message on alpha/sequence_phase",
+        "a message on alpha/supervision",
         "a message on alpha/imu",
     ]
 
 
 class Shared(Gauge):
-    """Reports the same of a message for each vehicle, and fails on the phases ``fail`` and ``exit``."""
+    """Reports the same of a message for each vehicle, and fails on the modes ``fail`` and ``exit``."""
 
     label = "shared"
-    every = (Diagnostics, SequencePhase)
+    every = (Diagnostics, Supervision)
 
     def take(self, message, now_ns):
-        yield f"{message.node} reports" if isinstance(message, Diagnostics) else "a phase"
-        if getattr(message, "phase", "") == "fail":
-            raise RuntimeError("no such phase")
-        if getattr(message, "phase", "") == "exit":
+        yield f"{message.node} reports" if isinstance(message, Diagnostics) else "a mode"
+        if getattr(message, "mode", "") == "fail":
+            raise RuntimeError("no such mode")
+        if getattr(message, "mode", "") == "exit":
             sys.exit("enough")
 
     def cell(self, newest, now_ns):
@@ -169,7 +170,7 @@ class Shared(Gauge):
 
 @pytest.fixture
 def shared():
-    part = Part("mine", "", topics=(Diagnostics, SequencePhase), gauges=(GaugeRow(5, Shared),))
+    part = Part("mine", "", topics=(Diagnostics, Supervision), gauges=(GaugeRow(5, Shared),))
     return Monitor(Tables((part,)), ("alpha", "beta"))
 
 
@@ -181,11 +182,11 @@ def test_what_all_vehicles_report_of_one_message_is_one_event(shared, message, d
 
 
 @pytest.mark.parametrize(
-    ("phase", "how"), [("fail", "RuntimeError: no such phase"), ("exit", "SystemExit: enough")]
+    ("mode", "how"), [("fail", "RuntimeError: no such mode"), ("exit", "SystemExit: enough")]
 )
-def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered, phase, how):
+def test_a_gauge_that_fails_is_reported_once_and_harms_nothing(shared, message, delivered, mode, how):
     for number in range(3):
-        shared.take_delivered(delivered(message(SequencePhase, phase=phase), number), 0)
+        shared.take_delivered(delivered(message(Supervision, mode=mode), number), 0)
     assert shared.take_lines() == [f"alpha: Shared failed: {how}"]
     assert row(shared, "shared") == "failed"
     assert row(shared, "shared", vehicle="beta") == "fine"

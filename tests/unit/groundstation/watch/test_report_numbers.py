@@ -8,9 +8,10 @@ import pytest
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import FixAccount, VehicleState
 from groundstation.parts.imu.messages import Imu
-from groundstation.parts.operation.messages import Diagnostics, Latency, SequencePhase
+from groundstation.parts.operation.messages import Diagnostics, Latency
 from groundstation.parts.overhead.messages import FixComparison
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand
 from groundstation.watch.figures import (
     draw_errors,
@@ -51,7 +52,7 @@ def flight(message, *, nis):
     def at(kind, t_s, **fields):
         return message(kind, "alpha", START_NS + round(t_s * 1e9), **fields)
 
-    yield at(SequencePhase, FLYING_S, phase="flying")
+    yield at(Supervision, FLYING_S, mode="flying")
     yield at(Diagnostics, 0.0, node="alpha/imu")
     goal = {"goal_position_table_m": (1.0, 2.0), "goal_heading_rad": math.pi - 0.01}
     yield at(ControlStatus, 0.0, **goal)

@@ -60,8 +60,14 @@ def test_each_mock_up_of_the_rig_gets_an_answer_to_each_picture():
     assert abs(alpha.x_m - POSES["alpha"][0]) < 0.001
     assert (beta.vehicle, beta.fix) == ("beta", False)
     assert "circle" in beta.reason
-    again = list(node.receive(image_of(pixels), 9))
+    fresh = pixels.copy()
+    fresh[:, 0] ^= 1  # another picture, the same circles
+    again = list(node.receive(image_of(fresh), 9))
     assert again[0].covariance == alpha.covariance  # each picture on its own
+    frozen = list(node.receive(image_of(fresh, ARRIVAL_NS + 500_000_000), 10))
+    assert [fix.fix for fix in frozen] == [False, False]
+    frozen_word = "frozen picture: it repeats the one of 0.50 s before byte for byte"
+    assert {fix.reason for fix in frozen} == {frozen_word}
 
     only = tracker_of("beta")
     assert [fix.vehicle for fix in only.receive(image_of(pixels), 8)] == ["beta"]

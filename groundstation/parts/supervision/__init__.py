@@ -1,0 +1,1 @@
+"""Whether a vehicle may fly: modes, stop, faults, arming."""

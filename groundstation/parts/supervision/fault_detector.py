@@ -1,0 +1,140 @@
+"""Fault detector: what the flight process sees wrong with sensors, fixes and valves of its vehicle."""
+
+from collections.abc import Iterator
+
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.parts.fusion.messages import FixAccount, FusionStatus
+from groundstation.parts.imu.messages import USABLE_RATE, Imu
+from groundstation.parts.supervision.messages import Findings, Supervision
+from groundstation.parts.valves.messages import ValveCommand, ValveStatus
+from groundstation.supervision.fix_watch import FixWatch
+from groundstation.supervision.imu_consistency import ImuConsistency
+from groundstation.supervision.imu_watch import ImuWatch
+from groundstation.supervision.valve_consistency import ValveConsistency
+
+PERIOD_NS = 50_000_000
+REPEAT_NS = 200_000_000
+NODE_NS = 70_000_000
+"""A node whose newest status is older may not have received the commands, which then explain nothing."""
+LIFTED_NS = 500_000_000
+"""After the float air came on bearings lift: until then motion says nothing about valves."""
+
+
+class FaultDetector(Node):
+    """Publishes what it finds at once when that changes, and five times a second.
+
+    Args:
+        vehicle: Its name.
+        fixes: Classes of the fixes that fusion takes, with the names of their sources.
+        valves: Compares motion with commands.
+        imu: Compares the gyro with fixes.
+    """
+
+    inputs: tuple[type[Message], ...] = (
+        Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, PoseFix,
+    )  # fmt: skip
+    outputs = (Findings,)
+
+    def __init__(
+        self,
+        vehicle: str,
+        fixes: dict[type[PoseFix], str],
+        valves: ValveConsistency,
+        imu: ImuConsistency,
+    ) -> None:
+        super().__init__(vehicle, PERIOD_NS)
+        self.inputs = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, *fixes)
+        self._sources = fixes
+        self._imu_watch = ImuWatch()
+        self._fix_watch = FixWatch()
+        self._valves = valves
+        self._imu = imu
+        self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
+        self._floats_from_ns: int | None = None
+        self._node_ns = 0
+        self._published: tuple[str, ...] = ()
+        self._published_ns = 0
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case Imu():
+                if self._sample(message, now_ns):
+                    yield from self._report(now_ns)
+            case ValveCommand():
+                if self._floats_from_ns is not None:
+                    self._valves.command(now_ns, message.pulse_id, message.on_time_ms)
+            case ValveStatus():
+                self._node_ns = now_ns
+            case PoseFix():
+                self._fix(message, now_ns)
+            case FixAccount():
+                self._account(message, now_ns)
+            case FusionStatus():
+                self._zeros = message.bias_rate_rad_s, message.bias_force_m_s2
+                if self._is_carried(now_ns):
+                    self._imu.zeros(now_ns, *self._zeros)
+            case Supervision():
+                self._follow(message, now_ns)
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        yield from self._report(now_ns)
+
+    def _is_carried(self, now_ns: int) -> bool:
+        return self._floats_from_ns is not None and now_ns >= self._floats_from_ns
+
+    def _follow(self, ruling: Supervision, now_ns: int) -> None:
+        """The air comes on or goes; what was found in a flight stays with the supervisor, not here."""
+        if ruling.is_in_flight and self._floats_from_ns is None:
+            self._floats_from_ns = now_ns + LIFTED_NS
+            self._valves.start(self._zeros[1])
+        elif not ruling.air_on and self._floats_from_ns is not None:
+            self._floats_from_ns = None
+            self._valves.reset()
+            self._imu.reset()
+
+    def _sample(self, imu: Imu, now_ns: int) -> bool:
+        self._imu_watch.take(
+            now_ns,
+            is_valid=imu.valid,
+            is_rate_usable=bool(imu.usable & USABLE_RATE),
+            reason=imu.reason,
+            elapsed_ms=imu.elapsed_ms,
+        )
+        if not (imu.valid and self._is_carried(now_ns)):
+            return False
+        rate_rad_s = imu.rate_body_rad_s - self._zeros[0]
+        self._imu.sample(imu.stamp_ns, rate_rad_s)
+        if now_ns - self._node_ns > NODE_NS:
+            self._valves.reset()
+            self._valves.start(self._zeros[1])
+            return False
+        return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
+
+    def _fix(self, fix: PoseFix, now_ns: int) -> None:
+        if not fix.fix:
+            self._fix_watch.take_picture(now_ns, str(getattr(fix, "reason", "")))
+        elif self._is_carried(now_ns):
+            self._imu.fix(self._sources[type(fix)], fix.stamp_ns, fix.heading_rad)
+
+    def _account(self, account: FixAccount, now_ns: int) -> None:
+        self._fix_watch.take_account(now_ns, is_used=account.used, reason=account.reason)
+        if self._is_carried(now_ns):
+            self._imu.account(
+                account.source,
+                used=account.used,
+                reason=account.reason,
+                innovation=account.innovation,
+                nis=account.nis,
+            )
+
+    def _report(self, now_ns: int) -> Iterator[Message]:
+        found = dict(self._imu_watch.findings(now_ns))
+        found.update(self._fix_watch.findings(now_ns))
+        for finding in (*self._valves.findings(now_ns), *self._imu.findings):
+            found[finding.id] = finding.detail
+        ids = tuple(found)
+        if ids != self._published or now_ns - self._published_ns >= REPEAT_NS:
+            self._published, self._published_ns = ids, now_ns
+            yield Findings(now_ns, self.vehicle, ids, tuple(found.values()))

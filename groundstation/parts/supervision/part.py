@@ -1,0 +1,103 @@
+"""Part ``supervision``: one supervisor per vehicle rules on valves and float air; faults move it."""
+
+from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
+from groundstation.declarations.part import Part
+from groundstation.declarations.port import Port, PortRow
+from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION, Rig
+from groundstation.fusion.noise import lag_of_bandwidth
+from groundstation.parts.control.sections import neighbours_of
+from groundstation.parts.fusion.sections import FusionOfType, fused_sources
+from groundstation.parts.imu.sections import ImuOfType
+from groundstation.parts.stars.sections import StarsOfType
+from groundstation.parts.supervision.actions import ACTIONS
+from groundstation.parts.supervision.fault_detector import FaultDetector
+from groundstation.parts.supervision.figures import SupervisionFigure
+from groundstation.parts.supervision.gauges import GAUGES
+from groundstation.parts.supervision.memory import MemoryPort
+from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
+from groundstation.parts.supervision.sections import SupervisionOfVehicle
+from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
+from groundstation.supervision.imu_consistency import ImuConsistency, ImuConsistencyConfig
+from groundstation.supervision.sightings import Sightings
+from groundstation.supervision.supervisor import Supervisor
+from groundstation.supervision.thrust_fit import FitConfig
+from groundstation.supervision.valve_consistency import ValveConsistency, ValveConsistencyConfig
+
+NODE_FRAMES_HZ, SPARE_FRAMES_HZ = 60.0, 100.0
+"""What a valve node sends a second, and what others may send besides."""
+RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
+HEADING_SIGMA_RAD = 0.002  # of fixes that are no camera's
+SLOPE_M_S2 = 0.005  # a table half a milliradian off level
+
+
+def _supervisor(rig: Rig, vehicle: str) -> Node:
+    model = rig.type_of(vehicle).model()
+    braking_m_s2 = RELIED_ON * WrenchEnvelope(model).max_force_n / model.mass_kg - SLOPE_M_S2
+    sightings = Sightings(
+        rig.table.keep_in(),
+        braking_m_s2,
+        MOCK_UP_RADIUS_M,
+        began_ns=0,
+        most_frames_hz=2.0 * NODE_FRAMES_HZ * len(rig.vehicles) + SPARE_FRAMES_HZ,
+        leaders=neighbours_of(rig, vehicle),
+    )
+    supervisor = Supervisor(
+        sightings,
+        rest_s=rig.of_type(vehicle, FusionOfType).fusion.rest_s,
+        period_ns=PERIOD_NS,
+        starts_by_itself=rig.vehicle(vehicle, SupervisionOfVehicle).starts_by_itself,
+    )
+    nodes = rig.tables.nodes
+    absent = {
+        row.name: f"this vehicle has no {row.answered_by.replace('_', ' ')}"
+        for row in rig.tables.actions.values()
+        if not {vehicle, ""} & set(nodes[row.answered_by].vehicles(rig))
+    }
+    others = tuple(name for name in rig.vehicles if name != vehicle)
+    return SupervisorNode(vehicle, supervisor, others, frozenset(rig.tables.actions), absent)
+
+
+def _detector(rig: Rig, vehicle: str) -> Node:
+    type_, imu = rig.type_of(vehicle), rig.of_type(vehicle, ImuOfType).imu
+    sources = {rig.tables.fix_sources[name].payload: name for name in fused_sources(rig, vehicle)}
+    floors_rad = [rig.tables.fix_sources[name].floor(rig, vehicle)[1] for name in sources.values()]
+    camera = rig.of_type(vehicle, StarsOfType).star_camera
+    heading_sigma_rad = max(HEADING_SIGMA_RAD if camera is None else camera.sigma_heading_rad, *floors_rad)
+    valves = ValveConsistencyConfig(
+        fit=FitConfig(
+            imu_position_body_m=imu.position_body_m,
+            gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
+            acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
+        ),
+        open_delay_s=type_.valves.open_delay_s,
+        close_delay_s=type_.valves.close_delay_s,
+        rise_s=type_.valves.rise_s,
+        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
+        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
+    )
+    gyro = ImuConsistencyConfig(
+        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz, heading_sigma_rad=heading_sigma_rad
+    )
+    return FaultDetector(vehicle, sources, ValveConsistency(type_.model(), valves), ImuConsistency(gyro))
+
+
+def _memory(rig: Rig, vehicle: str) -> Port:
+    del rig
+    return MemoryPort(f"{vehicle}/memory", vehicle, f"{STATION}memory")
+
+
+PART = Part(
+    name="supervision",
+    summary="modes, stop, faults and the arming gate of each vehicle",
+    topics=(Recalled, StopPress, Supervision, Faults, Findings),
+    nodes=(
+        NodeRow("supervisor", COMMANDS, Weight.URGENT, SupervisorNode, _supervisor),
+        NodeRow("fault_detector", FLIGHT, Weight.LIGHT, FaultDetector, _detector),
+    ),
+    ports=(PortRow("supervisor", MemoryPort, _memory),),
+    actions=tuple(ACTIONS.values()),
+    vehicle=SupervisionOfVehicle,
+    gauges=GAUGES,
+    figures=(SupervisionFigure,),
+)

@@ -1,0 +1,197 @@
+"""Supervisor: the shell around one vehicle's state machine (``groundstation.supervision``)."""
+
+from collections.abc import Iterator, Mapping
+
+from groundstation.control.state import ControlState
+from groundstation.declarations.lease import Lease, LeaseCheck
+from groundstation.declarations.message import Message
+from groundstation.declarations.node import Node
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.parts.operation.messages import RecorderStatus
+from groundstation.parts.supervision.actions import ACTIONS
+from groundstation.parts.supervision.memory import memory_of
+from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
+from groundstation.parts.valves.messages import ValveDemand, ValveStatus
+from groundstation.supervision.modes import Event
+from groundstation.supervision.sightings import NodeSeen, Seen
+from groundstation.supervision.supervisor import Ruling, Supervisor
+
+PERIOD_NS = 20_000_000
+REPEAT_NS = 100_000_000
+
+
+class SupervisorNode(Node):
+    """Publishes the ruling at once when it changes, and ten times a second.
+
+    Args:
+        vehicle: Its name.
+        supervisor: A fresh one.
+        others: Names of the other vehicles.
+        known: Names of all actions; it refuses what none of them is.
+        absent: Those of them that no node answers here, and why; it refuses these, too.
+    """
+
+    inputs = (
+        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveDemand, Findings,
+        RecorderStatus,
+    )  # fmt: skip
+    paced = (VehicleState,)
+    outputs = (Supervision, Faults, Ack)
+
+    def __init__(
+        self,
+        vehicle: str,
+        supervisor: Supervisor,
+        others: tuple[str, ...],
+        known: frozenset[str],
+        absent: Mapping[str, str],
+    ) -> None:
+        super().__init__(vehicle, PERIOD_NS)
+        self._supervisor = supervisor
+        self._others = others
+        self._known = known
+        self._absent = absent
+        self._lease = LeaseCheck()
+        self._fixes = (0, 0)  # used and refused, when they were reported last
+        self._published: Ruling | None = None
+        self._published_ns = 0
+
+    def sources(self, payload: type[Message]) -> tuple[str, ...]:
+        if payload is VehicleState:
+            return (self.vehicle, *self._others)
+        return (self.vehicle, "") if payload is StopPress else (self.vehicle,)
+
+    def start(self, now_ns: int) -> Iterator[Message]:
+        self._supervisor.sightings.began_ns = now_ns
+        yield from self._rule(now_ns)
+        yield self._faults(now_ns)
+
+    def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        match message:
+            case StopPress():
+                self._supervisor.press(message.author, message.press_id, now_ns)
+                yield from self._rule(now_ns)
+            case Request() if self._answers(message.action):
+                reason = self._carry_out(message, now_ns)
+                yield from self._rule(now_ns)  # first: what is answered has been kept
+                yield answer(message, now_ns, reason)
+            case Lease():
+                self._lease.take(message)
+            case Recalled():
+                memory = memory_of(message)
+                if memory is not None:
+                    self._supervisor.recall(memory, now_ns)
+                    yield from self._rule(now_ns)
+            case _:
+                self._see(message, now_ns)
+
+    def tick(self, now_ns: int) -> Iterator[Message]:
+        has_changed = self._supervisor.look(now_ns)
+        yield from self._rule(now_ns)
+        if has_changed:
+            yield self._faults(now_ns)
+
+    def _see(self, message: Message, now_ns: int) -> None:
+        sightings = self._supervisor.sightings
+        match message:
+            case VehicleState():
+                seen = _seen(message, now_ns)
+                if message.vehicle != self.vehicle:
+                    sightings.others[message.vehicle] = seen
+                else:
+                    sightings.own = seen
+            case FusionStatus():
+                sightings.rest_s, sightings.fix_age_s = message.rest_s, message.fix_age_s
+                self._count_fixes(message)
+            case ValveStatus():
+                sightings.node = NodeSeen(
+                    now_ns,
+                    message.armed,
+                    message.floating,
+                    message.dead_man,
+                    message.pressure_pa,
+                    message.faults,
+                    message.bus_rate_hz,
+                )
+            case ValveDemand():
+                sightings.demand_ns = now_ns
+            case Findings():
+                sightings.findings = dict(zip(message.ids, message.details, strict=True))
+                sightings.findings_ns = now_ns
+            case RecorderStatus():
+                sightings.recorder_ns, sightings.recorder_room_s = now_ns, message.room_s
+
+    def _count_fixes(self, status: FusionStatus) -> None:
+        used, refused = self._fixes
+        self._fixes = status.fixes_used, status.fixes_refused
+        if status.fixes_refused != refused or status.fixes_used < used:
+            self._supervisor.sightings.agreeing = 0
+        else:
+            self._supervisor.sightings.agreeing += status.fixes_used - used
+
+    def _answers(self, action: str) -> bool:
+        return action in ACTIONS or action in self._absent or action not in self._known
+
+    def _carry_out(self, request: Request, now_ns: int) -> str:
+        """Do what was asked; the reason if it cannot be done."""
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            return refusal
+        if request.action in self._absent:
+            return self._absent[request.action]
+        if request.action not in ACTIONS:
+            return f"unknown action '{request.action}' (known: {', '.join(sorted(self._known))})"
+        try:
+            given = ACTIONS[request.action].read(request)
+        except ArgumentError as error:
+            return str(error)
+        if request.action == Event.STOP:
+            self._supervisor.press(request.author, request.request_id, now_ns)
+            return ""
+        override = str(given.get("override", ""))
+        return self._supervisor.request(Event(request.action), request.author, now_ns, override)
+
+    def _rule(self, now_ns: int) -> Iterator[Message]:
+        ruling = self._supervisor.ruling()
+        if ruling == self._published and now_ns - self._published_ns < REPEAT_NS:
+            return
+        self._published, self._published_ns = ruling, now_ns
+        memory = ruling.memory
+        yield Supervision(
+            now_ns,
+            self.vehicle,
+            memory.mode,
+            ruling.law,
+            ruling.may_open,
+            ruling.is_air_on,
+            memory.is_stop_latched,
+            ruling.grace_s,
+            memory.is_flight_wanted,
+            int(memory.then),
+            memory.cause,
+            memory.author,
+            memory.since_ns,
+            ruling.waits_for,
+        )
+
+    def _faults(self, now_ns: int) -> Faults:
+        rows = tuple(self._supervisor.board)
+        return Faults(
+            now_ns,
+            self.vehicle,
+            tuple(row.fault.id for row in rows),
+            tuple(row.fault.what for row in rows),
+            tuple(row.detail for row in rows),
+            tuple(float(row.since_ns) for row in rows),
+            tuple(row.response.words for row in rows),
+            tuple(row.fault.advice for row in rows),
+            tuple(0.0 if row.is_there else float(row.seen_ns) for row in rows),
+        )
+
+
+def _seen(message: VehicleState, now_ns: int) -> Seen:
+    state = ControlState(
+        message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
+    )
+    return Seen(now_ns, state, message.status, message.pose_sigma)

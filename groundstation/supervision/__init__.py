@@ -1,0 +1,1 @@
+"""What decides whether a vehicle may fly: modes, faults, checks. Pure."""

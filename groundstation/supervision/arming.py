@@ -1,0 +1,137 @@
+"""The arming gate: one list of checks, each with a name and a reason when it refuses. Pure."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from groundstation.supervision.fault_board import Standing
+from groundstation.supervision.sightings import Sightings
+
+NEAREST_M = 0.45
+"""Between the centres of two mock-ups at take-off: both bodies, and the way that one drifts first."""
+OLDEST_FIX_S = 3.0
+AGREEING = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What the checks look at.
+
+    Attributes:
+        sightings: What is known.
+        standing: Faults of the vehicle.
+        rest_s: Length of rest that is asked for.
+        now_ns: The moment.
+    """
+
+    sightings: Sightings
+    standing: tuple[Standing, ...]
+    rest_s: float
+    now_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A row of the gate.
+
+    Attributes:
+        name: Named when it refuses.
+        summary: What must hold.
+        objection: What is wrong; empty if nothing is.
+        may_be_overridden: A person may fly in spite of it, with a reason.
+    """
+
+    name: str
+    summary: str
+    objection: Callable[[Question], str]
+    may_be_overridden: bool = False
+
+
+def _heartbeats(question: Question) -> str:
+    sightings, now_ns = question.sightings, question.now_ns
+    missing = [
+        name
+        for name, is_missing in (
+            ("valve node", sightings.node is None or sightings.is_node_silent(now_ns)),
+            ("fault detector", sightings.findings_ns is None),
+            ("fusion", sightings.own is None or sightings.is_state_silent(now_ns)),
+        )
+        if is_missing
+    ]
+    return f"nothing comes from {', '.join(missing)}" if missing else ""
+
+
+def _rest(question: Question) -> str:
+    rest_s = question.sightings.rest_s
+    if rest_s >= question.rest_s:
+        return ""
+    return f"unbroken rest of {rest_s:.1f} s, {question.rest_s:g} s are asked for"
+
+
+def _fixes(question: Question) -> str:
+    own, age_s = question.sightings.own, question.sightings.fix_age_s
+    if own is None or own.status != "flying":
+        return "no agreeing fixes have placed it yet"
+    if age_s > OLDEST_FIX_S:
+        return f"the newest fix is {age_s:.1f} s old"
+    agreeing = question.sightings.agreeing
+    return "" if agreeing >= AGREEING else f"{agreeing} fixes agree, {AGREEING} are asked for"
+
+
+def _pose(question: Question) -> str:
+    own = question.sightings.own
+    if own is None:
+        return ""
+    room_m = min(question.sightings.keep_in.edge_distances_m(own.state.position_table_m))
+    return "" if room_m >= 0.0 else f"it stands {-1e3 * room_m:.0f} mm outside its part of the table"
+
+
+def _apart(question: Question) -> str:
+    own = question.sightings.own
+    if own is None:
+        return ""
+    for name, other in question.sightings.others_here(question.now_ns).items():
+        apart_m = math.dist(own.state.position_table_m, other.position_table_m)
+        if apart_m < NEAREST_M:
+            return f"{name} is {apart_m:.2f} m away, {NEAREST_M:g} m are asked for"
+    return ""
+
+
+def _faults(question: Question) -> str:
+    return _names(row for row in question.standing if not row.fault.may_be_overridden)
+
+
+def _lesser_faults(question: Question) -> str:
+    return _names(row for row in question.standing if row.fault.may_be_overridden)
+
+
+def _names(rows: Iterable[Standing]) -> str:
+    return "; ".join(f"{row.fault.id} ({row.detail})" for row in rows if row.fault.blocks_arming)
+
+
+CHECKS: tuple[Check, ...] = (
+    Check("heartbeats", "fusion, fault detector and valve node publish", _heartbeats),
+    Check("faults", "no fault stands that keeps it on the ground", _faults),
+    Check("lesser faults", "nor one that a person may override", _lesser_faults, may_be_overridden=True),
+    Check("rest", "unbroken rest with good IMU data, as long as the rig asks for", _rest,
+          may_be_overridden=True),
+    Check("fixes", "agreeing fixes from pictures that are not repeated", _fixes),
+    Check("pose", "it stands on its part of the table", _pose),
+    Check("apart", "no other mock-up is too near", _apart),
+)  # fmt: skip
+"""THE TABLE. Faults cover recorder and disk, gas, battery, serial number and plausibility of the IMU."""
+
+
+def objections(question: Question, override: str = "") -> tuple[str, ...]:
+    """What keeps a vehicle on the ground, each with the name of its check.
+
+    Args:
+        question: What the checks look at.
+        override: A person's reason to fly in spite of what may be overridden; empty for none.
+    """
+    found = ((check, check.objection(question)) for check in CHECKS)
+    return tuple(
+        f"{check.name}: {text}"
+        for check, text in found
+        if text and not (override and check.may_be_overridden)
+    )

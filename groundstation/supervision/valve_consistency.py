@@ -1,0 +1,272 @@
+"""Whether a floating mock-up moves as its valves are commanded, and if not, which valve or what else it is.
+
+`docs/fault_detection.md` derives the tests and states what they cannot see.
+"""
+
+import math
+from dataclasses import dataclass
+
+from groundstation.control.vehicle import VehicleModel
+from groundstation.supervision.finding import Finding
+from groundstation.supervision.thrust_blocks import Block, ThrustBlocks
+from groundstation.supervision.thrust_fit import FitConfig, Misfit, ThrustFit
+from groundstation.supervision.valve_hypotheses import BY_ITSELF, Kind, Suspicion, ValveSuspicions
+
+PUSHED_HOLDS_NS = 2_000_000_000
+_SURE = 7.0
+"""Of two cases the better one is named alone when it is e^7 = 1100 times as likely."""
+_DOUBTED = 3.0
+"""A block is not learned from while a fault is that likely; a weak valve is what learning is to find out."""
+_UNEXPLAINED_CHANCE = (0.01, 0.9)
+"""Of a block that no valve explains: of a healthy flight, and of one that is being pushed."""
+_OF_COMMANDED = 0.35
+_OF_LARGEST = 0.3
+_HARD_PUSH = 1.7
+_CALM_BLOCKS = 10
+_LONGEST_PUSH_BLOCKS = 50
+"""After a shock valves are not accused while forces go on, but not for longer than this."""
+_TURN_KNOWN = 8.0
+"""The gyro has a say about thrust not commanded when it would have given this much evidence."""
+_IS_CONSTANT = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveConsistencyConfig:
+    """What the tests need to know.
+
+    Attributes:
+        fit: What is known of valves and sensors.
+        open_delay_s: From a command to thrust.
+        close_delay_s: From the end of an on-time to none.
+        rise_s: Time constant of the thrust.
+        acc_lag_s: Of the accelerometers' low-pass, 0 for none.
+        gyro_lag_s: Of the gyro's.
+        block_s: What is weighed at a time.
+        false_alarm_chance: Of any false alarm in `over_s` of flight.
+        over_s: See there.
+        wait_s: How long to wait for more evidence when two valves could explain it.
+        shift_s: A force without torque that lasts as long is a shifted accelerometer.
+    """
+
+    fit: FitConfig
+    open_delay_s: float = 0.006
+    close_delay_s: float = 0.005
+    rise_s: float = 0.004
+    acc_lag_s: float = 0.0
+    gyro_lag_s: float = 0.0
+    block_s: float = 0.02
+    false_alarm_chance: float = 0.01
+    over_s: float = 36_000.0
+    wait_s: float = 0.3
+    shift_s: float = 0.8
+
+
+class ValveConsistency:
+    """Compares commands with IMU samples. Only to be fed while the vehicle floats.
+
+    Args:
+        model: Mass, inertia, valves.
+        config: Delays, noise, wanted chance of a false alarm.
+
+    Attributes:
+        threshold: Evidence at which a fault is believed, in natural logarithms.
+    """
+
+    def __init__(self, model: VehicleModel, config: ValveConsistencyConfig) -> None:
+        self._config = config
+        self._blocks = ThrustBlocks(
+            model,
+            (config.open_delay_s, config.close_delay_s),
+            config.rise_s,
+            (config.acc_lag_s, config.gyro_lag_s),
+            config.block_s,
+        )
+        self._fit = ThrustFit(model, config.fit)
+        self._suspicions = ValveSuspicions(self._fit)
+        tests = len(self._suspicions.cases) + 1
+        self.threshold = math.log(tests * config.over_s / (config.block_s * config.false_alarm_chance))
+        self._largest = max(self._fit.sizes)
+        self._valve_findings: tuple[Finding, ...] = ()
+        self._pushed: tuple[int, Finding] | None = None
+        self._shifted: tuple[Finding, ...] = ()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._calm_after = self._pushed_blocks = 0
+        self._unexplained = 0.0
+        self._waited = 0
+        self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
+
+    def start(self, zero_force_m_s2: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Begin to be fed: the vehicle floats. Findings stay, and what was learned of the valves.
+
+        Args:
+            zero_force_m_s2: Zero of the accelerometers as known now, body axes.
+        """
+        self._blocks.reset()
+        self._fit.start(zero_force_m_s2)
+        self._suspicions.drop()
+        self._begin()
+
+    def reset(self) -> None:
+        """Forget findings."""
+        self._valve_findings = ()
+        self._shifted = ()
+        self._pushed = None
+        self._suspicions.drop()
+        self._begin()
+
+    def command(self, now_ns: int, pulse_id: int, on_time_ms: bytes | tuple[int, ...]) -> None:
+        """Take every output of the guard at the moment it is sent; repeats of a pulse id change nothing."""
+        self._blocks.command(now_ns, pulse_id, on_time_ms)
+
+    def sample(
+        self, stamp_ns: int, window_s: float, rate_rad_s: float, force_m_s2: tuple[float, float]
+    ) -> bool:
+        """Take an IMU sample that is believed; whether the findings may have changed.
+
+        Args:
+            stamp_ns: End of its averaging window.
+            window_s: Length of the window.
+            rate_rad_s: Turn rate, zero removed to some 0.01 rad/s.
+            force_m_s2: Specific force x, y as measured, body axes; `start` was given its zero.
+        """
+        if not (math.isfinite(rate_rad_s) and all(map(math.isfinite, force_m_s2))):
+            return False  # a hole in the samples; a sum with it would never be a number again
+        block = self._blocks.sample(stamp_ns, window_s, rate_rad_s, force_m_s2)
+        if block is None:
+            return False
+        before = self._valve_findings, self._shifted, self._pushed
+        self._take(block, stamp_ns)
+        return before != (self._valve_findings, self._shifted, self._pushed)
+
+    def findings(self, now_ns: int) -> tuple[Finding, ...]:
+        """What was found: valves and sensors until `reset`, pushes for two seconds."""
+        found = self._valve_findings + self._shifted
+        if self._pushed is not None and now_ns - self._pushed[0] < PUSHED_HOLDS_NS:
+            found += (self._pushed[1],)
+        return found
+
+    def _take(self, block: Block, stamp_ns: int) -> None:
+        misfit = self._fit.compare(block)
+        x, y = misfit.force_m_s2
+        size = math.hypot(x, y)
+        sigma = math.sqrt(misfit.force_variance)
+        odd = (
+            size > 4.0 * sigma + _OF_COMMANDED * misfit.commanded_m_s2 and size > _OF_LARGEST * self._largest
+        )
+        self._watch_odd(block, misfit, is_odd=odd)
+        broken = self._largest if self._valve_findings else 0.0
+        if size > _HARD_PUSH * self._largest + broken + misfit.commanded_m_s2 + 6.0 * sigma:
+            self._push(stamp_ns, size * block.span_s, "a shock that no valve can give")
+            return
+        if self._calm_after:
+            self._calm_after -= 1
+            self._pushed_blocks += 1
+            if odd and self._pushed_blocks < _LONGEST_PUSH_BLOCKS:
+                self._calm_after = max(self._calm_after, _CALM_BLOCKS // 2)
+            self._fit.lose_rate()
+            return
+        if self._valve_findings:
+            return  # what a second fault would look like beside the first is not worked out
+        spoke = self._suspicions.weigh(block, misfit)
+        usual, pushed = _UNEXPLAINED_CHANCE
+        chance = pushed / usual if odd and not spoke else (1.0 - pushed) / (1.0 - usual)
+        self._unexplained = max(0.0, self._unexplained + math.log(chance))
+        if self._unexplained > self.threshold:
+            self._push(stamp_ns, size * block.span_s, "a force that no valve explains")
+            return
+        worst = max(self._suspicions.cases, key=_evidence)
+        if worst.evidence >= self.threshold:
+            self._judge(stamp_ns)
+            return
+        self._waited = 0
+        if worst.evidence < (_SURE if worst.kind is Kind.WEAK else _DOUBTED):
+            self._fit.learn(block, misfit)
+
+    def _push(self, stamp_ns: int, change_m_s: float, what: str) -> None:
+        detail = f"{what}: {1e3 * change_m_s:.1f} mm/s within {1e3 * self._config.block_s:.0f} ms"
+        self._pushed = (stamp_ns, Finding("pushed", detail))
+        self._suspicions.drop()
+        self._unexplained = 0.0
+        self._calm_after, self._pushed_blocks = _CALM_BLOCKS, 0
+        self._fit.lose_rate()
+
+    def _watch_odd(self, block: Block, misfit: Misfit, *, is_odd: bool) -> None:
+        """A force that stays, is no valve's and is the same in every block: the sensor's."""
+        if not is_odd:
+            self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
+            return
+        x, y = misfit.force_m_s2
+        self._odd_blocks += 1
+        self._odd_x, self._odd_y = self._odd_x + x, self._odd_y + y
+        self._odd_square += x * x + y * y
+        count = self._odd_blocks
+        if count * block.span_s < self._config.shift_s or self._shifted or self._valve_findings:
+            return
+        if (self._odd_x**2 + self._odd_y**2) < _IS_CONSTANT * count * self._odd_square:
+            return
+        mean = (self._odd_x / count, self._odd_y / count)
+        detail = (
+            f"accelerometers read ({1e3 * mean[0]:.0f}, {1e3 * mean[1]:.0f}) mm/s^2 that no valve explains: "
+            "their zero moved, or a steady push"
+        )
+        self._shifted = (Finding("imu_shifted", detail),)
+        self._fit.shift_zero(mean)
+        self._suspicions.drop()
+
+    def _judge(self, stamp_ns: int) -> None:
+        """Name the valve, once there is one case left or the wait is over."""
+        cases = [case for case in self._suspicions.cases if case.evidence >= 0.5 * self.threshold]
+        best = max(cases, key=_unbounded)
+        rivals = [case for case in cases if case.unbounded > best.unbounded - _SURE]
+        by_itself = best.kind in BY_ITSELF
+        if by_itself:
+            # how much thrust is open, its direction is not: a half-open block must not favour small levers
+            alike = [case for case in cases if case.kind in BY_ITSELF]
+            best = max(alike, key=self._suspicions.direction)
+            least = self._suspicions.direction(best) - _SURE
+            rivals = [case for case in rivals if case.kind not in BY_ITSELF]
+            rivals += [case for case in alike if self._suspicions.direction(case) > least]
+        self._waited += 1
+        is_clear = len({case.valve for case in rivals}) == 1 and best.evidence >= self.threshold
+        if by_itself and best.turning < _TURN_KNOWN:
+            is_clear = False  # it may be a hand
+        if not is_clear and self._waited * self._config.block_s < self._config.wait_s:
+            return
+        self._waited = 0
+        turns_otherwise = by_itself and best.turning >= _TURN_KNOWN and best.by_rate < -0.5 * best.turning
+        if turns_otherwise or not self._suspicions.is_along(best):
+            size = math.hypot(best.residual_x, best.residual_y) / max(1, best.blocks)
+            self._push(stamp_ns, size * self._config.block_s, "a force that is no valve's")
+            return
+        self._valve_findings = (_named(best, rivals, self._all_weak()),)
+
+    def _all_weak(self) -> bool:
+        weak = [case for case in self._suspicions.cases if case.kind is Kind.WEAK]
+        return sum(case.evidence > 0.5 * self.threshold for case in weak) >= max(3, len(weak) // 2)
+
+
+def _evidence(case: Suspicion) -> float:
+    return case.evidence
+
+
+def _unbounded(case: Suspicion) -> float:
+    return case.unbounded
+
+
+def _named(best: Suspicion, rivals: list[Suspicion], all_weak: bool) -> Finding:
+    if best.kind is Kind.WEAK and all_weak:
+        return Finding("valve_weak", "most valves at half thrust or less: supply pressure")
+    what = {
+        Kind.CLOSED: "gives no thrust when commanded",
+        Kind.WEAK: "gives half its thrust or less",
+        Kind.OPEN: "gives thrust that was not commanded",
+        Kind.LEAK: "gives a part of its thrust that was not commanded",
+    }[best.kind]
+    kind = Kind.OPEN if best.kind is Kind.LEAK else best.kind
+    detail = f"valve {best.valve} {what} ({best.thrust_s:.2f} s of it)"
+    others = sorted({f"{case.valve} ({case.kind.value})" for case in rivals if case.valve != best.valve})
+    if others:
+        detail += f"; cannot be told apart from valve {', '.join(others)}"
+    return Finding(kind.value, detail)

@@ -1,0 +1,121 @@
+"""What the recorder reports of itself, and a recording that ends in time on a disk that fills."""
+
+import math
+import queue
+
+import pytest
+
+from groundstation.bus.cdr import codec_of
+from groundstation.bus.envelope import Envelope
+from groundstation.bus.record_stream import RecordWriter, read_batch
+from groundstation.launch.recorder import SPARE_BYTES, live_on, write_until_end
+from groundstation.launch.recorder_reporter import RATE_WINDOW_NS, RecorderReporter
+from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.policy import ImagePolicy
+from groundstation.recording.reader import Recording
+from groundstation.recording.writer import Recorder
+
+INFO = RecordingInfo(rig_toml="", rig_path="", images=ImagePolicy.OFF, calibration_sha256={}, seed=None)
+SECOND_NS = 1_000_000_000
+
+
+class Bus:
+    """Keeps what is published."""
+
+    def __init__(self):
+        self.at_once, self.batches = [], []
+
+    def put(self, topic, owner, encoded, attachment):
+        envelope = Envelope.of_attachment(topic, owner, attachment)
+        self.at_once.append((envelope, codec_of(RecorderStatus).decode(encoded)))
+
+    def publish_batch(self, process, batch):
+        self.batches.append((process, batch))
+
+
+def batch_of(*sequences):
+    writer = RecordWriter()
+    for sequence in sequences:
+        ages_s = tuple(map(math.sin, range(sequence, sequence + 20)))
+        message = Latency(sequence, "alpha", ("fix",) * 20, ages_s, ages_s)
+        envelope = Envelope(Latency.TOPIC, "alpha", sequence, sequence * SECOND_NS)
+        writer.add(envelope, codec_of(Latency).encode(message))
+    return writer.take()
+
+
+def record(recorder, *sequences):
+    recorder.record_batch(read_batch(batch_of(*sequences)), {"latency": Latency})
+    recorder.tick(10**18)
+
+
+def test_it_reports_at_once_and_twice_a_second_on_its_own_key_and_to_be_recorded(tmp_path):
+    bus = Bus()
+    with Recorder(tmp_path / "run.mcap", INFO) as recorder:
+        reporter = RecorderReporter(recorder, bus, "recorder", 100, free=lambda _path: 5_000_000)
+        for now_ms in range(0, 2000, 50):
+            reporter.look(now_ms * 1_000_000)
+    assert [envelope.sequence for envelope, _ in bus.at_once] == [101, 102, 103, 104]
+    first = bus.at_once[0][1]
+    assert (first.path, first.free_bytes) == (str(tmp_path / "run.mcap.part"), 5_000_000)
+    assert first.room_s == math.inf
+    recorded = [entry for process, batch in bus.batches for entry in read_batch(batch)]
+    assert [(entry.noun, entry.owner, entry.sequence) for entry in recorded] == [
+        ("recorder_status", "", number) for number in (101, 102, 103, 104)
+    ]
+
+
+def test_the_room_is_what_is_free_at_the_rate_of_the_last_seconds(tmp_path):
+    with Recorder(tmp_path / "run.mcap", INFO) as recorder:
+        reporter = RecorderReporter(recorder, Bus(), "recorder", free=lambda _path: 10_000_000)
+        before = reporter.look(0)
+        record(recorder, *range(1, 200))
+        after = reporter.look(2 * SECOND_NS)
+        rate = (after.written_bytes - before.written_bytes) / 2.0
+        assert rate > 1_000
+        assert after.room_s == pytest.approx((10_000_000 - recorder.rest_bytes) / rate)
+        quiet_ns = 2 * SECOND_NS + RATE_WINDOW_NS
+        assert reporter.look(quiet_ns).room_s == math.inf, "nothing was written in the last seconds"
+
+
+def test_on_a_disk_that_fills_it_ends_in_time_and_the_file_is_whole(tmp_path):
+    disk = SPARE_BYTES + 60_000
+    recorder = Recorder(tmp_path / "run.mcap", INFO)
+    reporter = RecorderReporter(recorder, Bus(), "recorder", free=lambda _path: disk - recorder.written_bytes)
+
+    def fill():
+        waiting = queue.SimpleQueue()
+        for number in range(1, 100_000, 50):
+            waiting.put(batch_of(*range(number, number + 50)))
+            waiting.put(None)
+            reporter._due_ns = 0
+            write_until_end(recorder, waiting, Bus(), "recorder", {"latency": Latency}, reporter)
+
+    with pytest.raises(RecordingError, match="the disk is full"):
+        fill()
+    recorder.finish()
+    assert (tmp_path / "run.mcap").stat().st_size < disk
+    with Recording(tmp_path / "run.mcap") as recording:
+        assert len(list(recording.delivered([Latency], ["alpha"]))) > 100
+
+
+@pytest.mark.parametrize("messages", [0, 1, 500, 20_000])
+def test_what_is_left_to_write_is_never_underestimated(tmp_path, messages):
+    recorder = Recorder(tmp_path / "run.mcap", INFO, flush_period_ns=SECOND_NS)
+    for begin in range(0, messages, 500):
+        rows = range(begin + 1, min(begin + 500, messages) + 1)
+        recorder.record_batch(read_batch(batch_of(*rows)), {"latency": Latency})
+    before, rest = recorder.written_bytes, recorder.rest_bytes
+    size = recorder.finish().stat().st_size
+    assert before <= size <= before + rest
+
+
+def test_a_recorder_without_a_file_lives_on_until_it_is_asked_to_end():
+    bus, waiting = Bus(), queue.SimpleQueue()
+    for item in (b"batch", b"nonsense", None):
+        waiting.put(item)
+    live_on(waiting, bus, "recorder")
+    ((process, batch),) = bus.batches
+    assert (process, list(read_batch(batch))) == ("recorder", [])
+    assert waiting.empty()
