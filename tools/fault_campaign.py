@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -213,8 +214,8 @@ def parameters_of(failure: str, rng: np.random.Generator) -> dict[str, float]:
     }.get(failure, {})
 
 
-def fly(failure: str, seed: int) -> Outcome:
-    """Fly once."""
+def fly(failure: str, seed: int, after_s: float = AFTER_S) -> Outcome:
+    """Fly once, for so long after the failure."""
     rng = np.random.default_rng([seed, *failure.encode()])
     start_s = float(rng.uniform(EARLIEST_S, LATEST_S))
     tilt = rng.uniform(-3e-4, 3e-4, 2)
@@ -230,10 +231,14 @@ def fly(failure: str, seed: int) -> Outcome:
     valve = int(given["valve"]) if "valve" in given else None
     judge = Judge(failure, start_s, valve)
     runner = make_runner(
-        parse_rig(text, Path("campaign.toml")), seed, [judge], requests=_laps(rng), journaled=False
+        parse_rig(text, Path("campaign.toml")),
+        seed,
+        [judge],
+        requests=_laps(rng, start_s + after_s),
+        journaled=False,
     )
     try:
-        runner.run(round((start_s + AFTER_S) * 1e9))
+        runner.run(round((start_s + after_s) * 1e9))
     finally:
         runner.close()
     hits = {fault: ns for fault, ns in judge.found.items() if fault in judge.expected}
@@ -256,9 +261,9 @@ def fly(failure: str, seed: int) -> Outcome:
     )
 
 
-def _laps(rng: np.random.Generator) -> Iterator[Request]:
+def _laps(rng: np.random.Generator, until_s: float) -> Iterator[Request]:
     """To and fro past the neighbour, at the speed that the controller chooses."""
-    for number in range(8):
+    for number in range(int((until_s - 10.0) / LEG_S)):
         side = 1.0 if number % 2 else -1.0
         goal = {
             "x_m": 0.1 if number % 2 else -0.9,
@@ -284,13 +289,16 @@ def main() -> int:
     parser.add_argument("--only", nargs="*", default=[], help="failures; all if none is named")
     parser.add_argument("--out", type=Path, default=Path("fault_campaign.jsonl"))
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--after", type=float, default=AFTER_S, help="s of flight after the failure begins")
     given = parser.parse_args()
     done = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
     names = given.only or (*failures(), HEALTHY)
     wanted = [(name, seed) for name in names for seed in range(1, given.seeds + 1)]
     missing = [pair for pair in wanted if not any((row["failure"], row["seed"]) == pair for row in done)]
     with ProcessPoolExecutor(given.jobs) as pool, given.out.open("a") as file:
-        for number, outcome in enumerate(pool.map(fly, *zip(*missing, strict=True)) if missing else (), 1):
+        for number, outcome in enumerate(
+            pool.map(fly, *zip(*missing, strict=True), repeat(given.after)) if missing else (), 1
+        ):
             row = asdict(outcome)
             done.append(row)
             file.write(json.dumps(row) + "\n")
