@@ -24,11 +24,13 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import cv2  # noqa: E402
 from bench import (  # noqa: E402
+    fault_flights,
     fresh_clone,
     house,
     live,
     lockstep_speed,
     many_mock_ups,
+    outage,
     overhead,
     parser,
     station_keeping,
@@ -52,6 +54,8 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
         "stop": stop.measure,
+        "outage": outage.measure,
+        "fault_flights": fault_flights.measure,
         "house": house.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
@@ -73,7 +77,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """THE TABLE of subjects, in the order of the page."""
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
-ON_REQUEST = frozenset({"fresh_clone", *FOLDERS})
+ON_REQUEST = frozenset({"fresh_clone", "fault_flights", *FOLDERS})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:
