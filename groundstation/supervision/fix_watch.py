@@ -9,7 +9,7 @@ KNOWN_INTERVALS = 3
 """So many intervals between fixes say how often they usually come."""
 PERIODS = 3.0
 LASTING_S = 1.0
-RARE_OVER_S, RARE_SHARE, OFTEN_HZ = 1.0, 0.6, 5.0
+RARE_OVER_S, RARE_SHARE, OFTEN_HZ = 2.0, 0.45, 5.0
 """Over so long fixes that usually come often come less than this share of their usual number."""
 REFUSED_IN_A_ROW = 8
 _INTERVALS = 9

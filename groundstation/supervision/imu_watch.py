@@ -19,11 +19,19 @@ class ImuWatch:
         self._bad_since_ns: int | None = None
         self._reason = ""
         self._is_rate_usable = True
+        self._tick_ms = 0
         self._jump = ""
         self._jump_ns = 0
 
     def take(
-        self, now_ns: int, *, is_valid: bool, is_rate_usable: bool, reason: str, elapsed_ms: int
+        self,
+        now_ns: int,
+        *,
+        is_valid: bool,
+        is_rate_usable: bool,
+        reason: str,
+        elapsed_ms: int,
+        tick_ms: int,
     ) -> None:
         """Account for a sample.
 
@@ -32,15 +40,16 @@ class ImuWatch:
             is_valid: Whether the reader believes it.
             is_rate_usable: Whether the reader believes its turn rate at least.
             reason: Why not.
-            elapsed_ms: Ticks of the block since the sample before; 0 after a restart of the block.
+            elapsed_ms: Ticks of the block since the sample before; 0 where that is not known.
+            tick_ms: Its ticks since its start.
         """
         if self._arrival_ns is not None:
             waited_ms = (now_ns - self._arrival_ns) // 1_000_000
-            if elapsed_ms == 0:
+            if tick_ms < self._tick_ms:
                 self._jump, self._jump_ns = "the block has started again", now_ns
             elif elapsed_ms > waited_ms + JUMP_MS:
                 self._jump, self._jump_ns = f"by {elapsed_ms - waited_ms} ms", now_ns
-        self._arrival_ns = now_ns
+        self._arrival_ns, self._tick_ms = now_ns, tick_ms
         if is_valid:
             self._bad_since_ns = None
         elif self._bad_since_ns is None:

@@ -1,6 +1,7 @@
 """Fault detector: what the flight process sees wrong with sensors, fixes and valves of its vehicle."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
@@ -18,8 +19,27 @@ PERIOD_NS = 50_000_000
 REPEAT_NS = 200_000_000
 NODE_NS = 70_000_000
 """A node whose newest status is older may not have received the commands, which then explain nothing."""
+LATE_NS = 100_000_000
+"""A sample that arrives later comes by a line or a machine that is held up, and so do commands."""
+MOST_BEHIND, COUNTER_MODULUS = 3, 16
+"""Commands, 20 ms each, that the node may be behind."""
+WITNESS_NS = 10_000_000_000
+"""So long the first finding about a valve waits for a second one that agrees."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
+
+
+PUSHED = "pushed"
+
+
+class _Suspect(NamedTuple):
+    """What was found about a valve, once."""
+
+    whose: str
+    since_ns: int
+
+
+_NOBODY = _Suspect("", 0)
 
 
 class FaultDetector(Node):
@@ -53,7 +73,8 @@ class FaultDetector(Node):
         self._imu = imu
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
-        self._node_ns = 0
+        self._node_ns = self._sent = 0
+        self._suspect = _NOBODY
         self._published: tuple[str, ...] = ()
         self._published_ns = 0
 
@@ -63,10 +84,12 @@ class FaultDetector(Node):
                 if self._sample(message, now_ns):
                     yield from self._report(now_ns)
             case ValveCommand():
+                self._sent = message.counter
                 if self._floats_from_ns is not None:
-                    self._valves.command(now_ns, message.pulse_id, message.on_time_ms)
+                    self._valves.command(message.stamp_ns, message.pulse_id, message.on_time_ms)
             case ValveStatus():
-                self._node_ns = now_ns
+                if (self._sent - message.counter) % COUNTER_MODULUS <= MOST_BEHIND:
+                    self._node_ns = now_ns
             case PoseFix():
                 self._fix(message, now_ns)
             case FixAccount():
@@ -91,6 +114,7 @@ class FaultDetector(Node):
             self._valves.start(self._zeros[1])
         elif not ruling.air_on and self._floats_from_ns is not None:
             self._floats_from_ns = None
+            self._suspect = _NOBODY
             self._valves.reset()
             self._imu.reset()
 
@@ -101,16 +125,34 @@ class FaultDetector(Node):
             is_rate_usable=bool(imu.usable & USABLE_RATE),
             reason=imu.reason,
             elapsed_ms=imu.elapsed_ms,
+            tick_ms=imu.tick_ms,
         )
         if not (imu.valid and self._is_carried(now_ns)):
             return False
         rate_rad_s = imu.rate_body_rad_s - self._zeros[0]
         self._imu.sample(imu.stamp_ns, rate_rad_s)
-        if now_ns - self._node_ns > NODE_NS:
-            self._valves.reset()
-            self._valves.start(self._zeros[1])
+        if now_ns - self._node_ns > NODE_NS or now_ns - imu.stamp_ns > LATE_NS:
+            self._begin_again()
             return False
-        return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
+        if not self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2):
+            return False
+        return self._is_witnessed(now_ns)
+
+    def _begin_again(self) -> None:
+        self._valves.reset()
+        self._valves.start(self._zeros[1])
+
+    def _is_witnessed(self, now_ns: int) -> bool:
+        """Whether a finding about a valve is the second one: timing that is off for once names none twice."""
+        for finding in self._valves.findings(now_ns):
+            if finding.id == PUSHED:
+                continue
+            whose = finding.detail.partition(" give")[0]
+            before, self._suspect = self._suspect, _Suspect(whose, now_ns)
+            if before.whose != whose or now_ns - before.since_ns > WITNESS_NS:
+                self._begin_again()
+                return False
+        return True
 
     def _fix(self, fix: PoseFix, now_ns: int) -> None:
         if not fix.fix:

@@ -135,6 +135,12 @@ class Run:
                 found["laboratory"] = pid
         return found
 
+    def end_in_order(self):
+        """Ask for the end; its code is 0, or 1 where it says that a fault landed a vehicle."""
+        code, _ = self.end()
+        landed = any("LANDED BY A FAULT" in line for line in self.lines)
+        assert code == int(landed), "\n".join(self.lines[-20:])
+
     def end(self, number=signal.SIGTERM):
         """Ask for the end; return exit code and the seconds that it took."""
         begin_s = time.monotonic()

@@ -53,7 +53,7 @@ def test_without_commands_the_valve_node_closes_and_the_vehicle_brakes_or_lands_
     run.wait_for("alpha: FAULT commands_restarted")
     run.wait_for("alpha: flying")
     run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     for vehicle in ("alpha", "beta"):
         modes = [row.mode for row in of(run.recording, Supervision, vehicle)]
         assert "braking" in modes
@@ -68,7 +68,7 @@ def test_one_vehicles_loop_dies_the_other_flies_on_and_it_flies_again(launch, tw
     run.wait_for("alpha/imu: open")
     for _ in range(4):
         run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     assert longest_silence_s(of(run.recording, VehicleState, "alpha")) > 0.5
     assert of(run.recording, VehicleState, "alpha")[-1].status == "flying"
     assert longest_silence_s(of(run.recording, VehicleState, "beta")) < 1.0
@@ -79,7 +79,7 @@ def test_the_station_may_die_without_touching_the_flight(launch, two_drawn):
     run, _ = fly_and(launch, two_drawn, "station", signal.SIGKILL)
     run.wait_for("station was ended by SIGKILL; starting it again")
     run.wait_for("alpha: flying")
-    assert run.end()[0] == 0
+    run.end_in_order()
     for vehicle in ("alpha", "beta"):
         assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0
         assert not any(status.dead_man for status in of(run.recording, ValveStatus, vehicle)[200:])
@@ -93,7 +93,7 @@ def test_a_dead_recorder_loses_nothing_that_was_written_and_goes_on_in_another_f
     run.wait_for("recorder was ended by SIGKILL; starting it again")
     for _ in range(3):
         run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     second = run.recording.with_stem("run_1")
     assert longest_silence_s(of(second, VehicleState, "alpha")) < 1.0
     whole = run.folder / "whole.mcap"
@@ -113,7 +113,7 @@ def test_the_sky_may_die_while_the_vehicle_flies_on_its_imu_and_sees_again(launc
     run.wait_for("alpha/star_camera: open")
     for _ in range(4):
         run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     gap_s = longest_silence_s(of(run.recording, StarFix, "alpha"))
     assert gap_s > 3 / 15, "the sky did not fall silent for even three pictures: was it killed?"
     assert longest_silence_s(of(run.recording, StarFix, "beta")) < 1.0
@@ -131,7 +131,7 @@ def test_the_fork_server_may_die_and_what_dies_after_it_is_started_again(launch,
     run.wait_for("alpha_flight was ended by SIGKILL; starting it again")
     run.wait_for("alpha/imu: open")
     run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     assert longest_silence_s(of(run.recording, VehicleState, "beta")) < 1.0
 
 
@@ -146,7 +146,7 @@ def test_a_launcher_that_was_paused_does_not_take_its_own_silence_for_that_of_ot
     run.wait_for("alpha", "flying", "armed")
     assert run.pids() == before
     assert not any("hangs" in line or "starting it again" in line for line in run.lines)
-    assert run.end()[0] == 0
+    run.end_in_order()
 
 
 def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):
@@ -155,7 +155,7 @@ def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn
     run.wait_for("resting")
     run.wait_until_flying()
     assert run.pids()["laboratory"] != old
-    assert run.end()[0] == 0
+    run.end_in_order()
 
 
 def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
@@ -168,7 +168,7 @@ def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
     assert refused.returncode == 1
     assert "outside the part of the table" in refused.stdout
     run.wait_for("alpha", "flying", "armed")
-    assert run.end()[0] == 0
+    run.end_in_order()
     with Recording(run.recording) as recording:
         rig = parse_rig(recording.info.rig_toml, two_drawn)
         report = ReplayRunner(recording, _factory(rig)).run()

@@ -13,7 +13,7 @@ class TestImu:
     @pytest.fixture
     def watch(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
+        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10, tick_ms=1000 + (0) // MS)
         return watch
 
     def test_before_the_first_sample_nothing_is_wrong(self):
@@ -25,7 +25,14 @@ class TestImu:
 
     def bad(self, watch, reason, start_ms=10, end_ms=110):
         for now_ms in range(start_ms, end_ms + 1, 10):
-            watch.take(now_ms * MS, is_valid=False, is_rate_usable=False, reason=reason, elapsed_ms=10)
+            watch.take(
+                now_ms * MS,
+                is_valid=False,
+                is_rate_usable=False,
+                reason=reason,
+                elapsed_ms=10,
+                tick_ms=1000 + (now_ms * MS) // MS,
+            )
 
     @pytest.mark.parametrize(
         ("reason", "fault"),
@@ -43,7 +50,14 @@ class TestImu:
 
     def test_one_good_sample_begins_the_count_anew(self, watch):
         self.bad(watch, "stuck", 10, 60)
-        watch.take(70 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
+        watch.take(
+            70 * MS,
+            is_valid=True,
+            is_rate_usable=True,
+            reason="",
+            elapsed_ms=10,
+            tick_ms=1000 + (70 * MS) // MS,
+        )
         self.bad(watch, "stuck", 80, 170)
         assert list(watch.findings(179 * MS)) == []
         assert [fault for fault, _ in watch.findings(180 * MS)] == ["imu_stuck"]
@@ -53,7 +67,7 @@ class TestImu:
         assert [fault for fault, _ in watch.findings(500 * MS)] == ["imu_silent"]
 
     def test_a_restart_of_the_block_is_shown_for_a_second(self, watch):
-        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0)
+        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0, tick_ms=3)
         jumped = ("imu_clock_jumped", "the block has started again")
         assert list(watch.findings(11 * MS)) == [jumped]
         self.keep(watch, 1000)
@@ -62,23 +76,58 @@ class TestImu:
 
     def keep(self, watch, until_ms):
         for now_ms in range(20, until_ms + 1, 10):
-            watch.take(now_ms * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=10)
+            watch.take(
+                now_ms * MS,
+                is_valid=True,
+                is_rate_usable=True,
+                reason="",
+                elapsed_ms=10,
+                tick_ms=1000 + (now_ms * MS) // MS,
+            )
 
     def test_the_very_first_sample_is_no_restart(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0)
+        watch.take(0, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=0, tick_ms=1000 + (0) // MS)
         assert list(watch.findings(0)) == []
 
     def test_ticks_far_beyond_the_wait_are_a_jump(self, watch):
-        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=210)
+        watch.take(
+            10 * MS,
+            is_valid=True,
+            is_rate_usable=True,
+            reason="",
+            elapsed_ms=210,
+            tick_ms=1000 + (10 * MS) // MS,
+        )
         assert list(watch.findings(10 * MS)) == []
-        watch.take(30 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=221)
+        watch.take(
+            30 * MS,
+            is_valid=True,
+            is_rate_usable=True,
+            reason="",
+            elapsed_ms=221,
+            tick_ms=1000 + (30 * MS) // MS,
+        )
         assert list(watch.findings(30 * MS)) == [("imu_clock_jumped", "by 201 ms")]
 
     def test_ticks_that_the_line_held_up_are_none(self, watch):
-        watch.take(600 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=800)
+        watch.take(
+            600 * MS,
+            is_valid=True,
+            is_rate_usable=True,
+            reason="",
+            elapsed_ms=800,
+            tick_ms=1000 + (600 * MS) // MS,
+        )
         assert list(watch.findings(600 * MS)) == []
-        watch.take(1200 * MS, is_valid=True, is_rate_usable=True, reason="", elapsed_ms=801)
+        watch.take(
+            1200 * MS,
+            is_valid=True,
+            is_rate_usable=True,
+            reason="",
+            elapsed_ms=801,
+            tick_ms=1000 + (1200 * MS) // MS,
+        )
         assert list(watch.findings(1200 * MS)) == [("imu_clock_jumped", "by 201 ms")]
 
 
@@ -129,8 +178,8 @@ class TestFixes:
     def test_fixes_that_become_rare_are_found_and_such_as_always_were_are_not(self, watch):
         self.use(watch, *range(0, 3000, 100))
         assert self.found(watch, 2990) == {}
-        self.use(watch, *range(3000, 5000, 250))
-        assert self.found(watch, 4990) == {"fixes_rare": "4 a second, usually 10"}
+        self.use(watch, *range(3000, 6000, 250))
+        assert self.found(watch, 5990) == {"fixes_rare": "4 a second, usually 10"}
         seldom = FixWatch()
         self.use(seldom, *range(0, 20_000, 667))
         assert self.found(seldom, 20_000) == {}
