@@ -12,6 +12,8 @@ LASTING_S = 1.0
 RARE_OVER_S, RARE_SHARE, OFTEN_HZ = 2.0, 0.45, 5.0
 """Over so long fixes that usually come often come less than this share of their usual number."""
 REFUSED_IN_A_ROW = 8
+USUAL_GAIN = 0.002
+"""Of the usual rate, each time it is asked: a minute or so."""
 _INTERVALS = 9
 REPEATS, TORN = "repeat", "torn picture"
 """What the reasons of pictures and fixes hold."""
@@ -71,7 +73,8 @@ class FixWatch:
             self._recent_ns.popleft()
         if len(self._intervals_s) < _INTERVALS:
             return
-        self._usual_hz = max(self._usual_hz, 1.0 / median(self._intervals_s))
+        now_hz = 1.0 / median(self._intervals_s)
+        self._usual_hz += USUAL_GAIN * (now_hz - self._usual_hz) if self._usual_hz else now_hz
         found_hz = len(self._recent_ns) / RARE_OVER_S
         if self._usual_hz >= OFTEN_HZ and found_hz < RARE_SHARE * self._usual_hz:
             yield "fixes_rare", f"{found_hz:.0f} a second, usually {self._usual_hz:.0f}"

@@ -75,6 +75,7 @@ class FaultDetector(Node):
         self._floats_from_ns: int | None = None
         self._node_ns = self._sent = 0
         self._suspect = _NOBODY
+        self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
         self._published: tuple[str, ...] = ()
         self._published_ns = 0
 
@@ -96,6 +97,7 @@ class FaultDetector(Node):
                 self._account(message, now_ns)
             case FusionStatus():
                 self._zeros = message.bias_rate_rad_s, message.bias_force_m_s2
+                self._has_rested = message.rest_s > 0.0
                 if self._is_carried(now_ns):
                     self._imu.zeros(now_ns, *self._zeros)
             case Supervision():
@@ -105,7 +107,8 @@ class FaultDetector(Node):
         yield from self._report(now_ns)
 
     def _is_carried(self, now_ns: int) -> bool:
-        return self._floats_from_ns is not None and now_ns >= self._floats_from_ns
+        """Whether motion can be judged: bearings carry, and a rest has shown the zero offsets."""
+        return self._has_rested and self._floats_from_ns is not None and now_ns >= self._floats_from_ns
 
     def _follow(self, ruling: Supervision, now_ns: int) -> None:
         """The air comes on or goes; what was found in a flight stays with the supervisor, not here."""
