@@ -26,7 +26,7 @@ from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
 from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.forking import share_one_arena
-from groundstation.launch.memory import forget, memory_folder
+from groundstation.launch.memory import claim_memory
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
 from groundstation.launch.urgency import going_first
@@ -80,7 +80,7 @@ class Launcher:
         self._fork_server = ForkServer(("groundstation.launch.preload",))
         self._unstarted = list(self._children.values())
         self._waiting: set[str] = set()  # started, but not told to go
-        self._memory = memory_folder(rig_path)
+        self._memory = claim_memory(rig_path, is_emulated=rig.laboratory is not None)
         self.endpoint = ""
         self.bus: ZenohBus | None = None
 
@@ -239,13 +239,17 @@ class Launcher:
         for name in sorted(self._waiting):
             child = self._children[name]
             child.started_s = self._time.now_s
-            child.write(pickle.dumps(Go({**self._addresses, f"{STATION}memory": str(self._memory)})))
+            child.write(
+                pickle.dumps(
+                    Go({**self._addresses, f"{STATION}memory": self._memory.address(child.restarts)})
+                )
+            )
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
         self._addresses = None
         if not laboratory.restarts:  # new mock-ups; one that is started again stands for the same ones
-            forget(self._memory)
+            self._memory.forget()
         laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
 
     def close(self) -> None:
@@ -265,6 +269,7 @@ class Launcher:
         for child in self.children:
             child.release()
         self._fork_server.close()
+        self._memory.release()
         if self.bus is not None:
             self.bus.close()
 

@@ -1,41 +1,86 @@
 """Where a rig's last modes are kept, so that a stop outlives every process, the launcher's included."""
 
+import fcntl
 import hashlib
 import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from groundstation.declarations.errors import GroundStationError
 
+MOST_RUNS = 64
+"""Of one emulated rig at a time."""
+EXPECTED = "?expected"
+"""Behind the folder, for a process that starts again and must find what was kept."""
 
-def memory_folder(rig_path: Path) -> Path:
+
+@dataclass(slots=True)
+class Memory:
+    """The folder of one run, which no other run uses meanwhile.
+
+    Attributes:
+        folder: Of the files.
+        lock: Held until the run is over, however it ends.
+    """
+
+    folder: Path
+    lock: IO[str]
+
+    def address(self, restarts: int) -> str:
+        """Where a process finds it that was started again so often."""
+        return f"{self.folder}{EXPECTED if restarts else ''}"
+
+    def forget(self) -> None:
+        """Forget what was kept: a newly started emulated laboratory starts fresh.
+
+        Raises:
+            GroundStationError: It cannot be removed.
+        """
+        for path in self.folder.glob("*.json"):
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise GroundStationError(f"{path} cannot be removed: {error.strerror}") from error
+
+    def release(self) -> None:
+        """Let other runs have it."""
+        self.lock.close()
+
+
+def claim_memory(rig_path: Path, *, is_emulated: bool) -> Memory:
     """The folder of one rig file, made if it is not there: in XDG_STATE_HOME, else in the home folder.
 
+    Runs of an emulated rig have mock-ups of their own, so each gets a folder of its own.
+
     Raises:
-        GroundStationError: It cannot be made.
+        GroundStationError: It cannot be made, or another run flies the same mock-ups.
     """
     base = os.environ.get("XDG_STATE_HOME", "")
     state = Path(base) if base and Path(base).is_absolute() else Path.home() / ".local" / "state"
     path = rig_path.resolve()
     name = f"{path.stem}-{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
-    folder = state / "groundstation" / name
+    for number in range(MOST_RUNS if is_emulated else 1):
+        folder = state / "groundstation" / (f"{name}-{number}" if number else name)
+        found = _claim(folder)
+        if found is not None:
+            return found
+    raise GroundStationError(f"another run flies the mock-ups of {rig_path}: end it first")
+
+
+def _claim(folder: Path) -> Memory | None:
+    """The folder, or None where another run has it."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock = (folder / "lock").open("w")
     except OSError as error:
         raise GroundStationError(
-            f"{folder} cannot be made ({error.strerror}): stops would not outlive a restart; "
+            f"{folder} cannot be used ({error.strerror}): stops would not outlive a restart; "
             "set XDG_STATE_HOME to a folder that can be written"
         ) from error
-    return folder
-
-
-def forget(folder: Path) -> None:
-    """Forget what was kept: a newly started emulated laboratory starts fresh.
-
-    Raises:
-        GroundStationError: It cannot be removed.
-    """
-    for path in folder.glob("*.json"):
-        try:
-            path.unlink(missing_ok=True)
-        except OSError as error:
-            raise GroundStationError(f"{path} cannot be removed: {error.strerror}") from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        return None
+    return Memory(folder, lock)

@@ -1,10 +1,11 @@
 """Which faults a vehicle has, since when, and the strongest response that is due."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from groundstation.supervision.faults import CLEAR_S, FAULTS, Clears, Fault, Response
 
+RECALLED = "it was there before a restart"
 _CLEAR_NS = round(CLEAR_S * 1e9)
 
 
@@ -82,6 +83,18 @@ class FaultBoard:
             self._standing[fault.id] = Standing(fault, detail, now_ns, now_ns)
         else:
             standing.seen_ns = now_ns
+
+    @property
+    def latched(self) -> tuple[str, ...]:
+        """Those that a person has to clear."""
+        return tuple(row.fault.id for row in self if row.fault.clears is Clears.PERSON)
+
+    def recall(self, fault_ids: Iterable[str], now_ns: int) -> None:
+        """Take up what was latched before a restart; what is no row any more is forgotten."""
+        for fault_id in fault_ids:
+            fault = self._faults.get(fault_id)
+            if fault is not None:
+                self._standing[fault_id] = Standing(fault, RECALLED, now_ns, now_ns, is_there=False)
 
     def clear(self) -> bool:
         """A person clears what is gone; True if anything was."""

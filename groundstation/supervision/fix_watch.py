@@ -24,18 +24,19 @@ class FixWatch:
 
     def __init__(self) -> None:
         self._used_ns: int | None = None
+        self._exposure_ns: int | None = None
         self._recent_ns: deque[int] = deque(maxlen=256)
         self._intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self._refused = 0
         self._usual_hz = 0.0
         self._marks: dict[str, tuple[int, str]] = {}
 
-    def take_account(self, now_ns: int, *, is_used: bool, reason: str) -> None:
-        """Account for what fusion did with a fix."""
+    def take_account(self, now_ns: int, exposure_ns: int, *, is_used: bool, reason: str) -> None:
+        """Account for what fusion did with a fix; several that waited may come at one moment."""
         if is_used:
-            if self._used_ns is not None:
-                self._intervals_s.append((now_ns - self._used_ns) * 1e-9)
-            self._used_ns = now_ns
+            if self._exposure_ns is not None and exposure_ns > self._exposure_ns:
+                self._intervals_s.append((exposure_ns - self._exposure_ns) * 1e-9)
+            self._used_ns, self._exposure_ns = now_ns, exposure_ns
             self._recent_ns.append(now_ns)
             self._refused = 0
         elif REPEATS in reason:

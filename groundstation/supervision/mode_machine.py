@@ -41,6 +41,7 @@ class Memory:
         cause: Of the mode.
         author: Who asked for it; empty for the station itself.
         since_ns: When the mode began, host monotonic clock.
+        latched: Faults that a person has to clear.
     """
 
     mode: Mode
@@ -50,6 +51,7 @@ class Memory:
     cause: str
     author: str
     since_ns: int
+    latched: tuple[str, ...] = ()
 
 
 class ModeMachine:

@@ -15,6 +15,8 @@ from groundstation.supervision.clearance import clearance
 NS_PER_S = 1_000_000_000
 STATE_S, NODE_S, FINDINGS_S, RECORDER_S, OTHER_S = 0.3, 0.5, 1.0, 2.0, 1.0
 """After so long without news, state, valve node, fault detector, recorder or another vehicle are silent."""
+FORGETTING_S = 0.5
+"""Memory that cannot be written is tried ten times a second."""
 FRESH_S = 0.1
 """An older status says nothing about an order that was just given."""
 STARTING_S = 10.0
@@ -99,6 +101,8 @@ class Sightings:
         recorder_ns: Arrival of the recorder's newest status; None where none was ever received.
         recorder_room_s: How long the recording can go on by the room on its disk.
         demand_ns: Arrival of the controller's newest demand; None where none was ever received.
+        memory_trouble: Why the memory could not be written; empty if it never failed.
+        memory_ns: When that was reported last.
         tick_ns: When the supervisor looked last.
         late_s: How late it looked now.
     """
@@ -120,6 +124,8 @@ class Sightings:
     recorder_ns: int | None = None
     recorder_room_s: float = math.inf
     demand_ns: int | None = None
+    memory_trouble: str = ""
+    memory_ns: int = 0
     tick_ns: int | None = None
     late_s: float = 0.0
 
@@ -170,7 +176,7 @@ class Sightings:
         }
         if not is_grounded or now_ns - self.began_ns > STARTING_S * NS_PER_S:
             found.update(self._silences(now_ns, is_grounded=is_grounded))
-        found.update(self._station())
+        found.update(self._station(now_ns))
         found.update(self._supplies())
         if is_aloft:
             found.update(self._motion(now_ns))
@@ -194,7 +200,9 @@ class Sightings:
             if seen is not None and self.is_silent(seen.arrival_ns, OTHER_S, now_ns):
                 yield "leader_old", f"{name}: {_age('state', seen.arrival_ns, now_ns)}"
 
-    def _station(self) -> Iterator[tuple[str, str]]:
+    def _station(self, now_ns: int) -> Iterator[tuple[str, str]]:
+        if self.memory_trouble and now_ns - self.memory_ns < FORGETTING_S * NS_PER_S:
+            yield "memory_lost", self.memory_trouble
         if self.late_s < -0.5 or self.late_s > STOOD_STILL_S:
             yield "clock_jumped", f"by {self.late_s:+.2f} s"
         elif self.late_s > LATE_TICK_S:

@@ -1,6 +1,6 @@
 """One vehicle's supervisor: what is seen becomes faults, faults and requests move the state machine. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from groundstation.supervision.arming import Question, objections
 from groundstation.supervision.fault_board import FaultBoard, Standing
@@ -72,11 +72,13 @@ class Supervisor:
         grace_s = float("inf")
         if memory.is_stop_latched:
             grace_s = GRACE_S if memory.mode in BRAKEABLE else 0.0
+        memory = replace(memory, latched=self.board.latched)
         return Ruling(memory, guarantee.law, guarantee.may_open, is_air_on, grace_s, self._waits_for)
 
     def recall(self, memory: Memory, now_ns: int) -> None:
         """Take up what was kept before a restart."""
         self._machine.recall(memory, now_ns)
+        self.board.recall(memory.latched, now_ns)
         if self.mode in BRAKEABLE:
             self._restarted = f"it was {memory.mode}"
 

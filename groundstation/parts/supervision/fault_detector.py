@@ -21,6 +21,8 @@ NODE_NS = 70_000_000
 """A node whose newest status is older may not have received the commands, which then explain nothing."""
 LATE_NS = 100_000_000
 """A sample that arrives later comes by a line or a machine that is held up, and so do commands."""
+LONGEST_HOLE_MS, DISTURBED_NS = 60, 2_000_000_000
+"""After a longer hole between samples nothing is judged for a while: filter and stamps settle."""
 MOST_BEHIND, COUNTER_MODULUS = 3, 16
 """Commands, 20 ms each, that the node may be behind."""
 WITNESS_NS = 10_000_000_000
@@ -74,6 +76,7 @@ class FaultDetector(Node):
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
         self._node_ns = self._sent = 0
+        self._disturbed_ns = -DISTURBED_NS
         self._suspect = _NOBODY
         self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
         self._published: tuple[str, ...] = ()
@@ -89,7 +92,8 @@ class FaultDetector(Node):
                 if self._floats_from_ns is not None:
                     self._valves.command(message.stamp_ns, message.pulse_id, message.on_time_ms)
             case ValveStatus():
-                if (self._sent - message.counter) % COUNTER_MODULUS <= MOST_BEHIND:
+                behind = (self._sent - message.counter) % COUNTER_MODULUS
+                if message.armed and not message.dead_man and behind <= MOST_BEHIND:
                     self._node_ns = now_ns
             case PoseFix():
                 self._fix(message, now_ns)
@@ -108,7 +112,9 @@ class FaultDetector(Node):
 
     def _is_carried(self, now_ns: int) -> bool:
         """Whether motion can be judged: bearings carry, and a rest has shown the zero offsets."""
-        return self._has_rested and self._floats_from_ns is not None and now_ns >= self._floats_from_ns
+        if not self._has_rested or now_ns - self._disturbed_ns < DISTURBED_NS:
+            return False
+        return self._floats_from_ns is not None and now_ns >= self._floats_from_ns
 
     def _follow(self, ruling: Supervision, now_ns: int) -> None:
         """The air comes on or goes; what was found in a flight stays with the supervisor, not here."""
@@ -132,9 +138,13 @@ class FaultDetector(Node):
         )
         if not (imu.valid and self._is_carried(now_ns)):
             return False
+        if now_ns - imu.stamp_ns > LATE_NS or imu.elapsed_ms > LONGEST_HOLE_MS:
+            self._disturbed_ns = now_ns
+            self._imu.reset()
+            self._begin_again()
         rate_rad_s = imu.rate_body_rad_s - self._zeros[0]
         self._imu.sample(imu.stamp_ns, rate_rad_s)
-        if now_ns - self._node_ns > NODE_NS or now_ns - imu.stamp_ns > LATE_NS:
+        if now_ns - self._node_ns > NODE_NS:
             self._begin_again()
             return False
         if not self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2):
@@ -164,7 +174,7 @@ class FaultDetector(Node):
             self._imu.fix(self._sources[type(fix)], fix.stamp_ns, fix.heading_rad)
 
     def _account(self, account: FixAccount, now_ns: int) -> None:
-        self._fix_watch.take_account(now_ns, is_used=account.used, reason=account.reason)
+        self._fix_watch.take_account(now_ns, account.stamp_ns, is_used=account.used, reason=account.reason)
         if self._is_carried(now_ns):
             self._imu.account(
                 account.source,

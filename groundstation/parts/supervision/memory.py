@@ -16,6 +16,9 @@ from groundstation.parts.supervision.messages import Recalled, Supervision
 from groundstation.supervision.mode_machine import Memory, Then
 from groundstation.supervision.modes import Mode
 
+EXPECTED = "expected"
+"""Behind the folder's address and a question mark: a process that starts again must find what was kept."""
+
 
 def text_of(ruling: Supervision) -> str:
     """What is kept of a ruling."""
@@ -26,6 +29,7 @@ def text_of(ruling: Supervision) -> str:
         "then": ruling.then,
         "cause": ruling.cause,
         "author": ruling.author,
+        "latched": list(ruling.latched),
     }
     return json.dumps(kept)
 
@@ -46,6 +50,7 @@ def memory_of(recalled: Recalled) -> Memory | None:
             str(given["cause"]),
             str(given["author"]),
             recalled.stamp_ns,
+            tuple(map(str, given["latched"])),
         )
     except (ValueError, KeyError, TypeError, RecursionError):
         return _unreadable("what was kept of its last mode cannot be read", recalled.stamp_ns)
@@ -56,14 +61,20 @@ def _unreadable(why: str, stamp_ns: int) -> Memory:
 
 
 class _MemoryEdge(Edge):
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, is_expected: bool) -> None:
         from drivers.memory_file import MemoryFile
 
+        self._path, self._is_expected = path, is_expected
         self._file = MemoryFile(path)
 
     def read(self) -> Iterable[tuple[int, object]]:
         found = self._file.read(READ_TIMEOUT_S)
-        return () if found is None else ((found[0], found[1:]),)
+        if found is None:
+            return ()
+        stamp_ns, text, trouble = found
+        if self._is_expected and not text:
+            trouble = trouble or f"{self._path} is gone or empty: what was kept there is lost"
+        return ((stamp_ns, (text, trouble)),)
 
     def write(self, data: object) -> None:
         assert isinstance(data, str)
@@ -96,4 +107,5 @@ class MemoryPort(Port):
         return text_of(payload)
 
     def open(self) -> Edge:
-        return _MemoryEdge(Path(str(self.address)) / f"{self.vehicle}.json")
+        folder, _, word = str(self.address).partition("?")
+        return _MemoryEdge(Path(folder) / f"{self.vehicle}.json", is_expected=word == EXPECTED)

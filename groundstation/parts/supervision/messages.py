@@ -37,6 +37,7 @@ class Supervision(Message):
         author: Who asked for it; empty for the station itself.
         since_ns: When the mode began.
         waits_for: Checks that keep it on the ground, where flight is wanted.
+        latched: Faults that a person has to clear.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Supervision"
@@ -53,6 +54,7 @@ class Supervision(Message):
     author: Text
     since_ns: I64
     waits_for: TextSequence
+    latched: TextSequence
 
     @property
     def is_in_flight(self) -> bool:

@@ -8,7 +8,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
-from groundstation.parts.operation.messages import RecorderStatus
+from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.memory import memory_of
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
@@ -34,7 +34,7 @@ class SupervisorNode(Node):
 
     inputs = (
         StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveDemand, Findings,
-        RecorderStatus,
+        RecorderStatus, Diagnostics,
     )  # fmt: skip
     paced = (VehicleState,)
     outputs = (Supervision, Faults, Ack)
@@ -63,9 +63,8 @@ class SupervisorNode(Node):
         return (self.vehicle, "") if payload is StopPress else (self.vehicle,)
 
     def start(self, now_ns: int) -> Iterator[Message]:
-        self._supervisor.sightings.began_ns = now_ns
-        yield from self._rule(now_ns)
-        yield self._faults(now_ns)
+        self._supervisor.sightings.began_ns = now_ns  # and no ruling before it has remembered
+        return iter(())
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
@@ -116,6 +115,8 @@ class SupervisorNode(Node):
                 )
             case ValveDemand():
                 sightings.demand_ns = now_ns
+            case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
+                sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns
             case Findings():
                 sightings.findings = dict(zip(message.ids, message.details, strict=True))
                 sightings.findings_ns = now_ns
@@ -173,6 +174,7 @@ class SupervisorNode(Node):
             memory.author,
             memory.since_ns,
             ruling.waits_for,
+            memory.latched,
         )
 
     def _faults(self, now_ns: int) -> Faults:

@@ -138,7 +138,7 @@ class TestFixes:
 
     def use(self, watch, *stamps_ms):
         for stamp_ms in stamps_ms:
-            watch.take_account(stamp_ms * MS, is_used=True, reason="")
+            watch.take_account(stamp_ms * MS, stamp_ms * MS, is_used=True, reason="")
 
     def found(self, watch, now_ms):
         return dict(watch.findings(now_ms * MS))
@@ -187,19 +187,19 @@ class TestFixes:
     def test_refused_fixes_in_a_row_are_wrong(self, watch):
         for count in range(REFUSED_IN_A_ROW):
             assert self.found(watch, 10) == {}
-            watch.take_account(count, is_used=False, reason="5 sigma")
+            watch.take_account(count, count, is_used=False, reason="5 sigma")
         assert self.found(watch, 10) == {"wrong_fixes": "8 refused in a row: 5 sigma"}
 
     def test_a_used_fix_ends_the_row(self, watch):
         for count in range(2 * REFUSED_IN_A_ROW):
-            watch.take_account(count * MS, is_used=count % 7 == 6, reason="5 sigma")
+            watch.take_account(count * MS, count * MS, is_used=count % 7 == 6, reason="5 sigma")
         assert self.found(watch, 100) == {}
 
     def test_after_a_used_fix_the_row_begins_at_one(self, watch):
         self.use(watch, 0)
         for count in range(REFUSED_IN_A_ROW):
             assert self.found(watch, 10) == {}
-            watch.take_account(count, is_used=False, reason="x")
+            watch.take_account(count, count, is_used=False, reason="x")
         assert "wrong_fixes" in self.found(watch, 10)
 
     def test_what_was_found_lasts_a_second(self, watch):
@@ -211,7 +211,7 @@ class TestFixes:
 
     def test_repeats_are_a_frozen_camera_and_no_wrong_fixes(self, watch):
         for count in range(2 * REFUSED_IN_A_ROW):
-            watch.take_account(count, is_used=False, reason="a repeat of 3 s ago")
+            watch.take_account(count, count, is_used=False, reason="a repeat of 3 s ago")
         assert self.found(watch, 0) == {"camera_frozen": "a repeat of 3 s ago"}
         other = FixWatch()
         other.take_picture(0, "repeats the picture before")
