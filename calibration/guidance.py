@@ -51,6 +51,10 @@ class Advice:
     """The goal that is furthest away, in words; empty when none is."""
     is_new: bool
     """Whether the step has just begun."""
+    ended: str = ""
+    """How the step before ended, if this one has just begun."""
+    note: str = ""
+    """What else the operator has to know: that it moves by itself, or what it waits for."""
 
 
 class GuidedSequence:
@@ -91,14 +95,24 @@ class GuidedSequence:
             return self._next(now_s, known)
         return Advice(step, shares[worst], missing, is_new=False)
 
+    def give_up(self, now_s: float, known: Mapping[str, float], why: str) -> Advice:
+        """End the step for a reason, with what is known by now."""
+        if 0 <= self._number < len(self._steps):
+            self.outcomes[self._steps[self._number].name] = f"given up: {why}"
+        return self._next(now_s, known)
+
     def _value(self, goal: Goal, known: Mapping[str, float]) -> float:
         value = known.get(goal.quantity, 0.0 if goal.is_amount else float("inf"))
         return value - self._base.get(goal.quantity, 0.0) if goal.is_amount else value
 
     def _next(self, now_s: float, known: Mapping[str, float]) -> Advice:
-        self._number += 1
+        ended = ""
+        if self._number >= 0 and self._number < len(self._steps):
+            name = self._steps[self._number].name
+            ended = f"{name}: {self.outcomes[name]}"
+        self._number = min(self._number + 1, len(self._steps))
         self._since_s = now_s
         self._base = MappingProxyType(dict(known))
         if self._number >= len(self._steps):
-            return Advice(None, 1.0, "", is_new=True)
-        return Advice(self._steps[self._number], 0.0, "", is_new=True)
+            return Advice(None, 1.0, "", is_new=True, ended=ended)
+        return Advice(self._steps[self._number], 0.0, "", is_new=True, ended=ended)

@@ -12,6 +12,7 @@ import hashlib
 import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -35,6 +36,9 @@ from groundstation.rig.read import load_rig
 GROUP = "groundstation.wizards"
 ADVICE_PERIOD_NS = 1_000_000_000
 SILENCE_NS = 10_000_000_000
+BEGIN_NS = 3_000_000_000
+"""So long it may take to learn what the vehicle does; latched topics come once a second."""
+BY_ITSELF = "it moves by itself: hands off, and keep clear of the table"
 
 Wish = tuple[str, Mapping[str, Value]]
 """An action, and its arguments by name."""
@@ -52,8 +56,17 @@ class Guide(Protocol):
     def advice(self, now_s: float) -> Advice:
         """Return what to do now; its step is None when there is enough data."""
 
+    def hindrance(self) -> str:
+        """Return why it cannot begin yet, a sentence; empty if it can."""
+
     def requests(self, now_s: float) -> Iterator[Wish]:
         """Yield what the vehicle has to be asked for, if it is to be driven."""
+
+    def answer(self, action: str, reason: str) -> None:
+        """Note that a request was carried out, or (with a reason) refused: a refusal ends the step."""
+
+    def trouble(self) -> str:
+        """Return why a driven calibration ends early, a sentence; empty while it goes on."""
 
     def outcome(self) -> Outcome:
         """Return the result.
@@ -98,7 +111,7 @@ class GuideNode(Node):
         author: In whose name requests are made; empty where the operator makes them.
 
     Attributes:
-        is_done: There is enough data, or nothing has arrived for long.
+        is_done: There is enough data, or it cannot begin, or a person took the vehicle, or nothing arrives.
         trouble: Why it ended without enough data; empty otherwise.
     """
 
@@ -112,13 +125,17 @@ class GuideNode(Node):
         self._author = author
         self._numbers = itertools.count(1)
         self._received_ns: int | None = None
+        self._began_ns: int | None = None
+        self._has_begun = False
+        self._sent: set[int] = set()
         self.is_done = False
         self.trouble = ""
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         if isinstance(message, Ack):
-            if message.author == self._author and not message.accepted and message.action == "go_to":
-                print(f"  {message.action} was refused: {message.reason}")
+            if message.author == self._author and message.request_id in self._sent:
+                self._sent.discard(message.request_id)
+                self._guide.answer(message.action, message.reason)
         else:
             self._received_ns = now_ns
             self._guide.take(message, now_ns)
@@ -127,20 +144,36 @@ class GuideNode(Node):
     def tick(self, now_ns: int) -> Iterator[Message]:
         if self.is_done:
             return
-        if self._received_ns is None:
-            self._received_ns = now_ns
-        if now_ns - self._received_ns > SILENCE_NS:
-            self.is_done, self.trouble = True, "nothing was received from the vehicle for 10 s."
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        self.trouble = self._hindrance(now_ns)
+        if self.trouble:
+            self.is_done = True
+        if self.is_done or not self._has_begun:
             return
         advice = self._guide.advice(now_ns * 1e-9)
+        if self._author and advice.is_new and advice.step is not None and not advice.step.is_rest:
+            advice = replace(advice, note="; ".join(filter(None, (BY_ITSELF, advice.note))))
         self._advise(advice)
         if advice.step is None:
             self.is_done = True
         elif self._author:
             for action, arguments in self._guide.requests(now_ns * 1e-9):
                 number = next(self._numbers)
+                self._sent.add(number)
                 text = json.dumps(dict(arguments))
                 yield Request(now_ns, self.vehicle, number, self._author, action, text)
+
+    def _hindrance(self, now_ns: int) -> str:
+        """Why it ends; empty while it goes on, or while it is still to be seen whether it can begin."""
+        began_ns = self._began_ns or now_ns
+        if not self._has_begun:
+            hindrance = self._guide.hindrance()
+            self._has_begun = not hindrance
+            return hindrance if now_ns - began_ns >= BEGIN_NS else ""
+        if now_ns - (self._received_ns or began_ns) > SILENCE_NS:
+            return "nothing was received from the vehicle for 10 s."
+        return self._guide.trouble() if self._author else ""
 
 
 def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven: bool) -> None:
@@ -183,9 +216,13 @@ def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven
 
 
 def _print_advice(advice: Advice) -> None:
+    if advice.ended:
+        print(f"  {advice.ended}", flush=True)
     if advice.step is None:
-        print("Enough data.", flush=True)
+        print("That was the last step.", flush=True)
     elif advice.is_new:
         print(f"{advice.step.name}: {advice.step.instruction}", flush=True)
     else:
         print(f"  {100 * advice.done:3.0f} %   {advice.missing}", flush=True)
+    if advice.note:
+        print(f"         {advice.note}", flush=True)

@@ -91,6 +91,8 @@ def check_node(
                     f"{where} receives {each.TOPIC.noun} of a vehicle {source!r:.80}, "
                     f"which the rig does not have (it has {', '.join(vehicles)})"
                 )
+            if node.takes_paced(each, source) and not each.TOPIC.pace_ns:
+                raise UsageError(f"{where} takes {each.TOPIC.noun} of {source!r} paced, which has no pace")
 
 
 def _wrong_in(part: Part) -> Iterator[str]:

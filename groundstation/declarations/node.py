@@ -46,6 +46,11 @@ class Node(ABC):
         del payload
         return (self.vehicle,)
 
+    def takes_paced(self, payload: type[Message], source: str) -> bool:
+        """Whether it takes a vehicle's ``payload`` topic paced; by kind unless a node states otherwise."""
+        del source
+        return payload in self.paced
+
     def start(self, now_ns: int) -> Iterable[Message]:
         """Messages to publish before anything is received, e.g. latched calibrations."""
         del now_ns

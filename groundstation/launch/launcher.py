@@ -156,13 +156,12 @@ class Launcher:
 
     def _look_after_laboratory(self, laboratory: Child, now_s: float) -> None:
         if laboratory.restart_at_s is not None:
-            if now_s >= laboratory.restart_at_s:
+            if self._have_the_others_ended(laboratory.restart_at_s, now_s):
                 laboratory.restarts += 1
                 self._start_laboratory(laboratory)
-                for child in self._children.values():
-                    if child.name != RECORDER:
-                        child.restarts += 1
-                        self._start(child)
+                for child in self._of_the_laboratory():
+                    child.restarts += 1
+                    self._start(child)
         elif laboratory.has_ended:
             if self._addresses is None and not laboratory.restarts:
                 raise GroundStationError(f"the laboratory {laboratory.how_it_ended()}")
@@ -172,12 +171,28 @@ class Launcher:
                 f"the laboratory {laboratory.how_it_ended()}: starting it again in {wait_s:.2g} s, "
                 "and every process with it, since its ports are new"
             )
-            for child in self._children.values():
-                if child.name != RECORDER:
-                    child.kill()
-                    child.restart_at_s = None
+            for child in self._of_the_laboratory():
+                child.ask_to_end()  # not killed: what they received of each other is still to be recorded
+                child.restart_at_s = None
         elif not laboratory.is_ready:
             self._read_announcement(laboratory)
+
+    def _of_the_laboratory(self) -> list[Child]:
+        """The processes that end and begin with it."""
+        return [child for child in self._children.values() if child.name != RECORDER]
+
+    def _have_the_others_ended(self, due_s: float, now_s: float) -> bool:
+        """Whether the laboratory may start again; who has not ended well after it was due is killed."""
+        if now_s < due_s:
+            return False
+        running = [
+            child for child in self._of_the_laboratory() if child.pid is not None and not child.has_ended
+        ]
+        if running and now_s < due_s + STOP_NODES_S:
+            return False
+        for child in running:
+            child.kill()
+        return True
 
     def _read_announcement(self, laboratory: Child) -> None:
         for line in laboratory.output():

@@ -70,7 +70,7 @@ class Step:
         ] = {}  # with the pace of who takes it paced
         for slot in slots:
             for kind, address in inputs_of(slot.node):
-                pace = Pace(kind.TOPIC.pace_ns) if kind in slot.node.paced else None
+                pace = Pace(kind.TOPIC.pace_ns) if slot.node.takes_paced(kind, address[1]) else None
                 self._receivers.setdefault(address, []).append(slot)
                 self._takers.setdefault(address, []).append((slot, pace))
         self._writers: dict[Address, Port] = {

@@ -4,11 +4,10 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from groundstation.supervision.apart import too_near
 from groundstation.supervision.fault_board import Standing
 from groundstation.supervision.sightings import Sightings
 
-NEAREST_M = 0.45
-"""Between the centres of two mock-ups at take-off: both bodies, and the way that one drifts first."""
 OLDEST_FIX_S = 3.0
 AGREEING = 2
 
@@ -91,9 +90,9 @@ def _apart(question: Question) -> str:
     if own is None:
         return ""
     for name, other in question.sightings.others_here(question.now_ns).items():
-        apart_m = math.dist(own.state.position_table_m, other.position_table_m)
-        if apart_m < NEAREST_M:
-            return f"{name} is {apart_m:.2f} m away, {NEAREST_M:g} m are asked for"
+        refusal = too_near(name, math.dist(own.state.position_table_m, other.position_table_m))
+        if refusal:
+            return refusal
     return ""
 
 

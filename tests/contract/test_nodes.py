@@ -1,5 +1,6 @@
 """Contracts over the nodes and ports of every example: who publishes, who receives, who sees truth."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,8 @@ def test_what_a_node_takes_paced_is_one_of_its_inputs_and_has_a_pace(name, nodes
         for kind in node.paced:
             assert kind in node.inputs, key
             assert kind.TOPIC.pace_ns > 0, key
+        for kind in node.inputs:
+            assert kind.TOPIC.pace_ns > 0 or not any(map(partial(node.takes_paced, kind), node.sources(kind)))
 
 
 @names

@@ -18,6 +18,7 @@ from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
+from groundstation.supervision.apart import Others
 
 STALE_NS = 300_000_000
 STATUS_EVERY = 2
@@ -32,12 +33,13 @@ class ControllerNode(Node):
         name: Of that row.
         goal: Held from the start.
         keep_in: Goals outside are refused.
-        neighbours: Other vehicles whose states the law wants.
+        neighbours: Other vehicles whose states the law wants, at their full rate.
+        others: All other vehicles: it is not sent to where one of them is, or is sent.
         period_s: Of the modulation.
         table_map: What pulls where on the table, fed forward; None where nobody knows.
     """
 
-    inputs = (VehicleState, FusionStatus, ValveDemand, ValveCommand, Request, Lease)
+    inputs = (VehicleState, ControlStatus, FusionStatus, ValveDemand, ValveCommand, Request, Lease)
     outputs = (Wrench, ControlStatus, Ack)
     trigger = VehicleState
 
@@ -49,6 +51,7 @@ class ControllerNode(Node):
         goal: Goal,
         keep_in: KeepIn,
         neighbours: tuple[str, ...],
+        others: tuple[str, ...],
         period_s: float,
         table_map: SlopeGrid | None = None,
     ) -> None:
@@ -57,7 +60,9 @@ class ControllerNode(Node):
         self._name = name
         self._goal = goal
         self._keep_in = keep_in
-        self._neighbours = neighbours
+        self._followed = frozenset((vehicle, *neighbours))
+        self._vehicles = (vehicle, *others)
+        self._others = Others()
         self._lease = LeaseCheck()
         self._states: dict[str, tuple[int, ControlState]] = {}
         self._own_rate = RateMean()
@@ -69,21 +74,18 @@ class ControllerNode(Node):
 
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
         if payload is VehicleState:
-            return (self.vehicle, *self._neighbours)
-        return (self.vehicle,)
+            return self._vehicles
+        return self._vehicles[1:] if payload is ControlStatus else (self.vehicle,)
+
+    def takes_paced(self, payload: type[Message], source: str) -> bool:
+        return payload is VehicleState and source not in self._followed
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
-            case VehicleState(status="flying"):
-                state = ControlState(
-                    message.position_table_m,
-                    message.velocity_table_m_s,
-                    message.heading_rad,
-                    message.rate_rad_s,
-                )
-                self._states[message.vehicle] = (message.stamp_ns, state)
-                if message.vehicle == self.vehicle:
-                    self._own_rate.add(state)
+            case VehicleState():
+                self._receive_state(message)
+            case ControlStatus():
+                self._others.goals_table_m[message.vehicle] = message.goal_position_table_m
             case FusionStatus():
                 self._slope_left_m_s2 = message.slope_left_m_s2
             case ValveDemand():
@@ -121,6 +123,18 @@ class ControllerNode(Node):
         if self._ticks % STATUS_EVERY == 0:
             yield self._status(state, now_ns)
 
+    def _receive_state(self, message: VehicleState) -> None:
+        if message.vehicle != self.vehicle:
+            self._others.positions_table_m[message.vehicle] = message.position_table_m
+        if message.status != "flying" or message.vehicle not in self._followed:
+            return
+        state = ControlState(
+            message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
+        )
+        self._states[message.vehicle] = (message.stamp_ns, state)
+        if message.vehicle == self.vehicle:
+            self._own_rate.add(state)
+
     def _with_slope(self, state: ControlState) -> ControlState:
         """Add what is known to pull here: the map, and what the filter finds beyond it."""
         if self._map is None:
@@ -137,8 +151,10 @@ class ControllerNode(Node):
         x, y, heading = (float(given[name]) for name in ("x_m", "y_m", "heading_rad"))
         if min(self._keep_in.edge_distances_m((x, y))) < 0.0:
             return f"({x:.3f}, {y:.3f}) m lies outside the part of the table that vehicles keep to"
-        self._goal = Goal((x, y), heading)
-        return ""
+        refusal = self._others.objection((x, y))
+        if not refusal:
+            self._goal = Goal((x, y), heading)
+        return refusal
 
     def _status(self, state: ControlState, now_ns: int) -> ControlStatus:
         setpoint = self._law.setpoint(self._goal)

@@ -1,5 +1,6 @@
 """Part ``control``: the state becomes the wrench that the vehicle's controller wants."""
 
+import itertools
 import math
 from typing import Any
 
@@ -14,7 +15,8 @@ from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.controller_node import ControllerNode
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
-from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of
+from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of, neighbours_of
+from groundstation.supervision.apart import too_near
 
 
 def _row(rig: Rig, vehicle: str) -> ControllerRow[Any]:
@@ -39,6 +41,7 @@ def _controller(rig: Rig, vehicle: str) -> Node:
         goal,
         keep_in,
         row.neighbours(config),
+        tuple(name for name in rig.vehicles if name != vehicle),
         rig.type_of(vehicle).valves.period_s,
         rig.table.slope_grid(),
     )
@@ -66,6 +69,18 @@ def _check(rig: Rig) -> None:
             row.make(config, rig.type_of(name).model(), rig.table.keep_in())
         except ValueError as error:
             raise ValueError(f"{key}.parameters: {error}") from error
+
+    _check_holds(rig)
+
+
+def _check_holds(rig: Rig) -> None:
+    """Poses that are held at the same time are apart; who follows others is told by them where to go."""
+    held = {name: rig.vehicles[name].hold for name in rig.vehicles if not neighbours_of(rig, name)}
+    for (name, hold), (other, its) in itertools.combinations(held.items(), 2):
+        apart_m = math.dist((hold.x_m, hold.y_m), (its.x_m, its.y_m))
+        refusal = too_near(f"the hold pose of {name}", apart_m, relation="from there")
+        if refusal:
+            raise ValueError(f"vehicles.{other}.hold: {refusal}")
 
 
 def _check_name(controller: str, key: str) -> None:

@@ -193,3 +193,33 @@ def test_a_mistake_is_one_sentence_with_file_and_key(tmp_path, old, new, sentenc
         parse_rig(text.replace(old, new, 1), path)
     assert str(refused.value).startswith(f"{path}: {sentence}")
     assert "\n" not in str(refused.value)
+
+
+TWO = DRAWN.parent / "two_mock_ups.toml"
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("x_m = -0.5, y_m = 0.1", "the hold pose of alpha is 0.00 m from there, 0.45 m are asked for"),
+        ("x_m = -0.5, y_m = 0.54", "the hold pose of alpha is 0.44 m from there, 0.45 m are asked for"),
+    ],
+)
+def test_two_that_would_hold_too_near_to_each_other_are_refused_with_the_distance(place, words):
+    text = TWO.read_text()
+    old = "x_m = 0.6, y_m = -0.1"
+    assert text.count(old) == 1
+    with pytest.raises(RigError) as refused:
+        parse_rig(text.replace(old, place), TWO)
+    assert str(refused.value) == f"{TWO}: vehicles.beta.hold: {words}"
+    parse_rig(text.replace(old, "x_m = -0.5, y_m = 0.56"), TWO)
+
+
+def test_who_follows_another_may_have_a_hold_pose_anywhere_on_the_table():
+    text = TWO.read_text().replace("x_m = 0.6, y_m = -0.1", "x_m = -0.5, y_m = 0.1")
+    text += """
+[vehicles.beta.control]
+controller = "formation"
+parameters = { neighbours = { alpha = { offset_m = [0.6, 0.0] } } }
+"""
+    assert parse_rig(text, TWO).vehicles["beta"].hold.x_m == -0.5

@@ -155,6 +155,16 @@ def test_who_takes_a_topic_paced_receives_the_first_of_each_period_the_others_al
     assert len(fast.taken) == 8
 
 
+def test_a_node_may_take_a_topic_of_one_vehicle_paced_and_that_of_another_not():
+    class HalfPaced(Taker):
+        def takes_paced(self, payload, source):
+            return payload is VehicleState and source == "bravo"
+
+    bench = Bench(HalfPaced("alpha", VehicleState, sources=("alpha", "bravo")))
+    assert bench.step.is_paced(("state", "bravo"))
+    assert not bench.step.is_paced(("state", "alpha"))
+
+
 def test_what_belongs_to_the_whole_rig_is_received_by_nodes_of_vehicles():
     node = Taker("alpha", CanIn)
     assert list(inputs_of(node)) == [(CanIn, ("can_in", ""))]
