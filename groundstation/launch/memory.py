@@ -5,7 +5,6 @@ import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from groundstation.declarations.errors import GroundStationError
 
@@ -21,11 +20,11 @@ class Memory:
 
     Attributes:
         folder: Of the files.
-        lock: Held until the run is over, however it ends.
+        lock: Descriptor of the lock file, held until the run is over, however it ends.
     """
 
     folder: Path
-    lock: IO[str]
+    lock: int
 
     def address(self, restarts: int) -> str:
         """Where a process finds it that was started again so often."""
@@ -45,7 +44,7 @@ class Memory:
 
     def release(self) -> None:
         """Let other runs have it."""
-        self.lock.close()
+        os.close(self.lock)
 
 
 def claim_memory(rig_path: Path, *, is_emulated: bool) -> Memory:
@@ -72,7 +71,7 @@ def _claim(folder: Path) -> Memory | None:
     """The folder, or None where another run has it."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        lock = (folder / "lock").open("w")
+        lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
         raise GroundStationError(
             f"{folder} cannot be used ({error.strerror}): stops would not outlive a restart; "
@@ -81,6 +80,6 @@ def _claim(folder: Path) -> Memory | None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        lock.close()
+        os.close(lock)
         return None
     return Memory(folder, lock)

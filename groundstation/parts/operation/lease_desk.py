@@ -30,7 +30,7 @@ ACTIONS = table_of(
 
 
 class LeaseDesk(Node):
-    """Publishes the lease whenever it changes; others keep to the last one until it expires.
+    """Publishes the lease at its start (nobody's) and whenever it changes.
 
     Args:
         vehicles: Requests may name any of them, or none: the lease is the rig's.
@@ -47,6 +47,9 @@ class LeaseDesk(Node):
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
         del payload
         return (*self._vehicles, "")
+
+    def start(self, now_ns: int) -> Iterator[Message]:
+        yield self._grant(now_ns, "", 0)
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         if not isinstance(message, Request) or message.action not in ACTIONS:

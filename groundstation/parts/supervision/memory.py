@@ -50,7 +50,7 @@ def memory_of(recalled: Recalled) -> Memory | None:
             str(given["cause"]),
             str(given["author"]),
             recalled.stamp_ns,
-            tuple(map(str, given["latched"])),
+            tuple(map(str, given.get("latched", ()))),
         )
     except (ValueError, KeyError, TypeError, RecursionError):
         return _unreadable("what was kept of its last mode cannot be read", recalled.stamp_ns)

@@ -25,7 +25,7 @@ def screen_of(vehicles, width=WIDTH, height=HEIGHT, keys=HELP):
         for message in (
             Supervision(
                 now_ns, name, "braking", "brake", True, True, True, 12.0, False, 2,
-                "stopped: brakes, holds, lands " + "x" * 90, "anna", now_ns, (),
+                "stopped: brakes, holds, lands " + "x" * 90, "anna", now_ns, (), (),
             ),
             Faults(
                 now_ns, name, ("star_outage", "low_tank"), ("No fix.", "Gas."), ("7 s", "1 bar"),

@@ -33,7 +33,7 @@ JUNK = 10_000
 
 def ruling(now_ns, mode, *, latched=False):
     return Supervision(
-        now_ns, "alpha", mode, "closed", False, False, latched, 0.0, False, 0, "", "", now_ns, ()
+        now_ns, "alpha", mode, "closed", False, False, latched, 0.0, False, 0, "", "", now_ns, (), ()
     )
 
 

@@ -182,18 +182,18 @@ class TestFaults:
         assert flying.run(3.0) == ["holding"]
 
     def test_a_fault_that_lands_brakes_holds_and_lands(self, flying):
-        flying.findings = {"can_flooded": "9000 frames/s"}
+        flying.findings = {"camera_frozen": "9000 frames/s"}
         flying.velocity = (0.05, 0.0)
         assert flying.run(1.0) == ["braking"]
         flying.velocity = (0.0, 0.0)
         assert flying.run(2.0) == ["holding"]
         assert flying.run(0.2) == ["landing", "resting"]
-        assert flying.ruling.memory.cause.endswith("can_flooded (9000 frames/s)")
+        assert flying.ruling.memory.cause.endswith("camera_frozen (9000 frames/s)")
         assert flying.run(20.0) == ["resting"]
-        assert flying.ruling.waits_for == ("faults: can_flooded (9000 frames/s)",)
+        assert flying.ruling.waits_for == ("faults: camera_frozen (9000 frames/s)",)
 
     def test_a_fault_that_lands_makes_it_land_even_if_it_goes(self, flying):
-        flying.findings = {"can_flooded": ""}
+        flying.findings = {"camera_frozen": ""}
         flying.step()
         flying.findings, flying.sightings.rest_s = {}, 0.0
         assert flying.run(3.0) == ["holding", "landing", "resting"]
@@ -202,12 +202,12 @@ class TestFaults:
         flying.ask(Event.BRAKE)
         flying.run(0.5)
         assert flying.mode is Mode.HOLDING
-        flying.findings = {"can_flooded": ""}
+        flying.findings = {"camera_frozen": ""}
         assert flying.run(0.02) == ["holding"]
         assert flying.run(3.0) == ["holding", "landing", "resting"]
 
     def test_braking_without_end_is_not_begun_again_by_its_own_fault(self, flying):
-        flying.findings = {"can_flooded": ""}
+        flying.findings = {"camera_frozen": ""}
         flying.velocity = (0.05, 0.0)
         assert flying.run(10.0) == ["braking"]
         assert flying.run(0.1) == ["landing", "resting"]
@@ -241,7 +241,7 @@ class TestFaults:
         assert flying.faults == ["valve_stuck_open"]
 
     def test_flight_is_wanted_again_after_a_fault_that_clears_by_itself(self, flying):
-        flying.findings = {"can_flooded": ""}
+        flying.findings = {"camera_frozen": ""}
         flying.run(5.0)
         flying.findings = {}
         assert flying.run(3.0) == ["resting", "armed", "flying"]
@@ -263,9 +263,9 @@ class TestFaults:
         assert flying.run(0.1) == ["landing", "resting"]
 
     def test_faults_without_details_are_named_alone(self, flying):
-        flying.findings = {"can_flooded": ""}
+        flying.findings = {"camera_frozen": ""}
         flying.step()
-        assert flying.ruling.memory.cause == "brakes for a fault, then lands: can_flooded"
+        assert flying.ruling.memory.cause == "brakes for a fault, then lands: camera_frozen"
 
     def test_a_state_that_is_silent_is_not_at_rest(self, flying):
         flying.silent.add("state")
@@ -276,7 +276,7 @@ class TestFaults:
     def test_a_fault_while_armed_lands(self, vehicle):
         vehicle.step()
         assert vehicle.mode is Mode.ARMED
-        vehicle.findings = {"can_flooded": ""}
+        vehicle.findings = {"camera_frozen": ""}
         vehicle.step()
         assert vehicle.mode is Mode.LANDING
 
@@ -371,7 +371,7 @@ class TestStop:
         assert flying.ruling.memory.cause == "braking does not help: the air is cut: vehicle_unavoidable"
 
     def test_a_stop_with_room_brakes_whatever_else_is_wrong(self, flying):
-        flying.sightings.findings = {"can_flooded": ""}
+        flying.sightings.findings = {"camera_frozen": ""}
         assert flying.press(1)
         assert flying.mode is Mode.BRAKING
 

@@ -25,7 +25,7 @@ def ruling(t_s, mode, author=""):
     now_ns = BEGAN_NS + round(t_s * SECOND_NS)
     return Supervision(
         now_ns, "alpha", mode, "closed", False, False, False, 0.0, False, 0, f"{mode} for a reason", author,
-        now_ns, (),
+        now_ns, (), (),
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ def ruling(memory):
     return Supervision(
         5, "alpha", memory.mode, "brake", True, True, memory.is_stop_latched, math.inf,
         memory.is_flight_wanted, int(memory.then), memory.cause, memory.author, memory.since_ns, (),
+        memory.latched,
     )  # fmt: skip
 
 

@@ -242,7 +242,7 @@ class TestMemory:
         usual = {
             "law": "closed", "may_open": False, "air_on": False, "stop_latched": False, "grace_s": 0.0,
             "flight_wanted": False, "then": 0, "cause": "why", "author": "anna", "since_ns": 0,
-            "waits_for": (),
+            "waits_for": (), "latched": (),
         }  # fmt: skip
         return text_of(Supervision(0, "alpha", mode, **(usual | changes)))
 

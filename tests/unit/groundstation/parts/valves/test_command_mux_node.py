@@ -49,7 +49,7 @@ def ruling(law, mode=None, cause="the cause"):
     usual = {"controller": "flying", "brake": "braking", "closed": "landed"}
     opens = law != "closed"
     return Supervision(
-        0, "alpha", mode or usual[law], law, opens, opens, False, math.inf, True, 0, cause, "", 0, ()
+        0, "alpha", mode or usual[law], law, opens, opens, False, math.inf, True, 0, cause, "", 0, (), ()
     )
 
 

@@ -33,7 +33,7 @@ class Driven:
 
     def rule(self, *, may_open=True, stop_latched=False, grace_s=math.inf):
         ruling = Supervision(
-            0, "alpha", "m", "l", may_open, False, stop_latched, grace_s, False, 0, "", "", 0, ()
+            0, "alpha", "m", "l", may_open, False, stop_latched, grace_s, False, 0, "", "", 0, (), ()
         )
         return list(self.node.receive(ruling, self.now_ms * MS))
 

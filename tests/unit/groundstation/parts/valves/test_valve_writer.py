@@ -31,7 +31,7 @@ def command(stop_reason=NO_STOP, grace_s=0.0, arm=0):
 
 
 def ruling(*, air_on):
-    return Supervision(0, "alpha", "m", "l", False, air_on, False, math.inf, False, 0, "", "", 0, ())
+    return Supervision(0, "alpha", "m", "l", False, air_on, False, math.inf, False, 0, "", "", 0, (), ())
 
 
 def arrive(writer, message, now_ms=0):
