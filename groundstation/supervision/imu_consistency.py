@@ -41,7 +41,7 @@ class ImuConsistencyConfig:
     gyro_density_rad_s_rthz: float
     heading_sigma_rad: float
     stamp_sigma_s: float = 1e-3
-    scale_sigma: float = 15e-3
+    scale_sigma: float = 5e-3
     zero_sigma_rad_s: float = 5e-4
     zero_step_rad_s: float = 5e-3
     usual_refusals: float = 0.05

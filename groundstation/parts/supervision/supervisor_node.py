@@ -86,9 +86,10 @@ class SupervisorNode(Node):
                 self._see(message, now_ns)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
+        is_first = self._published is None
         has_changed = self._supervisor.look(now_ns)
         yield from self._rule(now_ns)
-        if has_changed:
+        if has_changed or is_first:
             yield self._faults(now_ns)
 
     def _see(self, message: Message, now_ns: int) -> None:
