@@ -58,7 +58,7 @@ def test_a_gyro_that_reads_the_end_of_its_scale_is_named_and_not_believed(fly):
     assert all("gyro_range" in imu.reason for imu in samples)
     assert not any(imu.valid for imu in samples)
     assert_landed(flight, "imu_stuck")
-    assert flight.run(6.0).modes()[-1] == "resting"  # a code that never changes is for a person to clear
+    assert flight.run(6.0).modes()[-1] == "landed"  # a code that never changes is for a person to clear
     flight.request("fly")
     assert flight.run(4.0).modes()[-1] == "flying"
 
