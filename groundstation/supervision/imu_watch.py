@@ -30,7 +30,6 @@ class ImuWatch:
         is_valid: bool,
         is_rate_usable: bool,
         reason: str,
-        elapsed_ms: int,
         tick_ms: int,
     ) -> None:
         """Account for a sample.
@@ -40,15 +39,15 @@ class ImuWatch:
             is_valid: Whether the reader believes it.
             is_rate_usable: Whether the reader believes its turn rate at least.
             reason: Why not.
-            elapsed_ms: Ticks of the block since the sample before; 0 where that is not known.
             tick_ms: Its ticks since its start.
         """
         if self._arrival_ns is not None:
             waited_ms = (now_ns - self._arrival_ns) // 1_000_000
-            if tick_ms < self._tick_ms:
+            ticked_ms = tick_ms - self._tick_ms
+            if ticked_ms < 0:
                 self._jump, self._jump_ns = "the block has started again", now_ns
-            elif elapsed_ms > waited_ms + JUMP_MS:
-                self._jump, self._jump_ns = f"by {elapsed_ms - waited_ms} ms", now_ns
+            elif ticked_ms > waited_ms + JUMP_MS:
+                self._jump, self._jump_ns = f"by {ticked_ms - waited_ms} ms", now_ns
         self._arrival_ns, self._tick_ms = now_ns, tick_ms
         if is_valid:
             self._bad_since_ns = None

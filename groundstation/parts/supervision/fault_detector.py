@@ -31,7 +31,11 @@ LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
 
 
-PUSHED = "pushed"
+PUSHED, WRONG_FIXES, LEANING = "pushed", "wrong_fixes", "beyond their covariance"
+NO_FORCE = (0.0, 0.0)
+"""Waves of the table move what the filter takes for their zeros; the check of the valves finds steps."""
+INCONSISTENT = "filter_inconsistent"
+"""Fixes that are used and lean: an unmapped table does that, and nothing is wrong that landing would mend."""
 
 
 class _Suspect(NamedTuple):
@@ -103,7 +107,7 @@ class FaultDetector(Node):
                 self._zeros = message.bias_rate_rad_s, message.bias_force_m_s2
                 self._has_rested = message.rest_s > 0.0
                 if self._is_carried(now_ns):
-                    self._imu.zeros(now_ns, *self._zeros)
+                    self._imu.zeros(now_ns, self._zeros[0], NO_FORCE)
             case Supervision():
                 self._follow(message, now_ns)
 
@@ -133,7 +137,6 @@ class FaultDetector(Node):
             is_valid=imu.valid,
             is_rate_usable=bool(imu.usable & USABLE_RATE),
             reason=imu.reason,
-            elapsed_ms=imu.elapsed_ms,
             tick_ms=imu.tick_ms,
         )
         if not (imu.valid and self._is_carried(now_ns)):
@@ -188,7 +191,8 @@ class FaultDetector(Node):
         found = dict(self._imu_watch.findings(now_ns))
         found.update(self._fix_watch.findings(now_ns))
         for finding in (*self._valves.findings(now_ns), *self._imu.findings):
-            found[finding.id] = finding.detail
+            leans = finding.id == WRONG_FIXES and LEANING in finding.detail
+            found[INCONSISTENT if leans else finding.id] = finding.detail
         ids = tuple(found)
         if ids != self._published or now_ns - self._published_ns >= REPEAT_NS:
             self._published, self._published_ns = ids, now_ns
