@@ -156,7 +156,7 @@ FAULTS: Mapping[str, Fault] = {
         Fault("valve_stuck_closed", "A valve does not push when it is opened.",
               "acceleration against the commands", 1.0,
               ((0.0, _LAND),), _PERSON, True, False, "Look at the coil, the hose and the valve.",
-              ("stuck_closed_valve",)),
+              ("stuck_closed_valve", "weak_valve")),
         Fault("valve_weak", "A valve pushes with less than it should.",
               "acceleration against the commands", 10.0,
               ((0.0, _NOTE),), _PERSON, True, True, "Look at pressure and nozzle.", ("weak_valve",)),
