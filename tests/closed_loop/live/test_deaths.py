@@ -78,7 +78,7 @@ def test_one_vehicles_loop_dies_the_other_flies_on_and_it_flies_again(launch, tw
 def test_the_station_may_die_without_touching_the_flight(launch, two_drawn):
     run, _ = fly_and(launch, two_drawn, "station", signal.SIGKILL)
     run.wait_for("station was ended by SIGKILL; starting it again")
-    run.wait_for("alpha: flying")
+    run.wait_for("alpha", "flying", "armed")
     run.end_in_order()
     for vehicle in ("alpha", "beta"):
         assert longest_silence_s(of(run.recording, VehicleState, vehicle)) < 1.0

@@ -47,7 +47,7 @@ def test_a_hanging_controller_is_braked_for_and_started_again(launch, own_packag
     run.wait_for("all processes are ready")
     for _ in range(2):
         run.wait_for(*FLYING)
-    assert run.end()[0] == 0
+    run.end_in_order()
     with Recording(run.recording) as recording:
         states = [row.payload for row in recording.messages((VehicleState,))]
         flying = [state for state in states if state.status == "flying"]
