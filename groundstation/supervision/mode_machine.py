@@ -130,12 +130,14 @@ class ModeMachine:
             return f"{event} is for the station itself to decide"
         if row.is_gated and objections:
             return "; ".join(objections)
+        was_stopped = self.memory.is_stop_latched
         self._note(event)
         after = row.after
         if after is Mode.LANDED and event is Event.AIR_IS_OFF:
             after = self._grounded()
         words = f"{row.cause}: {cause}" if cause else row.cause
-        keeps_cause = (event, self.mode) in _KEEPS_CAUSE and not cause
+        is_stopped_already = was_stopped and event in _LANDINGS
+        keeps_cause = ((event, self.mode) in _KEEPS_CAUSE or is_stopped_already) and not cause
         stays = after is self.mode
         self.memory = replace(
             self.memory,
@@ -200,6 +202,8 @@ class ModeMachine:
             self.apply(Event.HELD, now_ns)
 
 
+_LANDINGS = frozenset({Event.LAND, Event.DISARM, Event.FLOAT_OFF})
+"""Of a vehicle that a person has stopped already: who stopped it stays the one to be named."""
 _KEEPS_CAUSE = frozenset(
     {
         (Event.AT_REST, Mode.BRAKING),

@@ -111,12 +111,15 @@ def test_the_first_message_of_a_publisher_reaches_a_subscriber_whom_the_hub_has_
 
 def test_a_mailbox_keeps_the_newest_in_order_until_it_is_looked_into(hub, flight):
     mailbox = hub[0].collect(f"{RECORD}/*", 3)
-    all_of_it = subscribe(hub[0], f"{RECORD}/*")  # declared later, so served later
+    all_of_it = subscribe(hub[0], f"{RECORD}/*")
     assert mailbox.take() == []
     for number in range(5):
         flight.publish_batch("flight", bytes([number]))
     for _ in range(5):
         all_of_it.get(timeout=WITHIN_S)
+    after = subscribe(hub[0], "after/all")  # served when everybody was served all that came before
+    flight._session.put("after/all", b"")
+    after.get(timeout=WITHIN_S)
     found = mailbox.take()
     assert len(found) == 3
     assert found == [(f"{RECORD}/flight", bytes([number])) for number in (2, 3, 4)]
