@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.declarations.errors import GroundStationError
+from groundstation.parts.supervision.memory import EXPECTED
 
 MOST_RUNS = 64
 """Of one emulated rig at a time."""
-EXPECTED = "?expected"
-"""Behind the folder, for a process that starts again and must find what was kept."""
 
 
 @dataclass(slots=True)
@@ -28,7 +27,7 @@ class Memory:
 
     def address(self, restarts: int) -> str:
         """Where a process finds it that was started again so often."""
-        return f"{self.folder}{EXPECTED if restarts else ''}"
+        return f"{self.folder}{f'?{EXPECTED}' if restarts else ''}"
 
     def forget(self) -> None:
         """Forget what was kept: a newly started emulated laboratory starts fresh.

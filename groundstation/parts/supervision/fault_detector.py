@@ -29,8 +29,6 @@ WITNESS_NS = 10_000_000_000
 """So long the first finding about a valve waits for a second one that agrees."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
-
-
 PUSHED, WRONG_FIXES, LEANING = "pushed", "wrong_fixes", "beyond their covariance"
 NO_FORCE = (0.0, 0.0)
 """Waves of the table move what the filter takes for their zeros; the check of the valves finds steps."""
@@ -163,7 +161,8 @@ class FaultDetector(Node):
         for finding in self._valves.findings(now_ns):
             if finding.id == PUSHED:
                 continue
-            whose = finding.detail.partition(" give")[0]
+            is_of_valve = finding.id.startswith("valve_")  # closed or weak: the same valve is what counts
+            whose = finding.detail.partition(" give")[0] if is_of_valve else finding.id
             before, self._suspect = self._suspect, _Suspect(whose, now_ns)
             if before.whose != whose or now_ns - before.since_ns > WITNESS_NS:
                 self._begin_again()

@@ -25,7 +25,7 @@ class Source:
     def waitForNextFrame(self):
         frame = next(self.frames, "silence")
         if frame == "silence":
-            time.sleep(60.0)
+            time.sleep(60.0)  # a system that falls silent: the library blocks for good, and is killed
         if frame == "crash":
             os.kill(os.getpid(), 11)
         if frame == "throw":
@@ -39,7 +39,7 @@ def connect(system, arguments):
     if "refuse" in arguments:
         raise RuntimeError(arguments["refuse"])
     if "hang" in arguments:
-        time.sleep(60.0)
+        time.sleep(60.0)  # a system that does not answer: connecting blocks for good, and is killed
     return Source(json.loads(arguments["frames"]))
 """
 

@@ -78,7 +78,7 @@ class Inlet(Port):
         return Rain(stamp_ns, self.vehicle, 0.0)
 
     def open(self):
-        raise NotImplementedError
+        raise NotImplementedError  # declarations are checked here, and nothing is opened
 
 
 def node(**changes):

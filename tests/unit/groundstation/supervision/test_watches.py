@@ -9,29 +9,29 @@ MS = 1_000_000
 S = 1000 * MS
 
 
+def sample(watch, now_ms, tick_ms, refused=""):
+    """Give a sample of the block, believed unless a reason says otherwise."""
+    is_valid = not refused
+    watch.take(now_ms * MS, is_valid=is_valid, is_rate_usable=is_valid, reason=refused, tick_ms=tick_ms)
+
+
 class TestImu:
     @pytest.fixture
     def watch(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, is_rate_usable=True, reason="", tick_ms=1000 + (0) // MS)
+        sample(watch, 0, 1000)
         return watch
 
     def test_before_the_first_sample_nothing_is_wrong(self):
         assert list(ImuWatch().findings(10 * S)) == []
 
     def test_silence_is_found_after_its_time(self, watch):
-        assert list(watch.findings(149 * MS)) == []
+        assert list(watch.findings(299 * MS)) == []
         assert list(watch.findings(301 * MS)) == [("imu_silent", "the newest sample is 0.30 s old")]
 
     def bad(self, watch, reason, start_ms=10, end_ms=110):
         for now_ms in range(start_ms, end_ms + 1, 10):
-            watch.take(
-                now_ms * MS,
-                is_valid=False,
-                is_rate_usable=False,
-                reason=reason,
-                tick_ms=1000 + now_ms,
-            )
+            sample(watch, now_ms, 1000 + now_ms, refused=reason)
 
     @pytest.mark.parametrize(
         ("reason", "fault"),
@@ -49,13 +49,7 @@ class TestImu:
 
     def test_one_good_sample_begins_the_count_anew(self, watch):
         self.bad(watch, "stuck", 10, 60)
-        watch.take(
-            70 * MS,
-            is_valid=True,
-            is_rate_usable=True,
-            reason="",
-            tick_ms=1000 + (70 * MS) // MS,
-        )
+        sample(watch, 70, 1070)
         self.bad(watch, "stuck", 80, 170)
         assert list(watch.findings(179 * MS)) == []
         assert [fault for fault, _ in watch.findings(180 * MS)] == ["imu_stuck"]
@@ -65,7 +59,7 @@ class TestImu:
         assert [fault for fault, _ in watch.findings(500 * MS)] == ["imu_silent"]
 
     def test_a_restart_of_the_block_is_shown_for_a_second(self, watch):
-        watch.take(10 * MS, is_valid=True, is_rate_usable=True, reason="", tick_ms=3)
+        sample(watch, 10, 3)
         jumped = ("imu_clock_jumped", "the block has started again")
         assert list(watch.findings(11 * MS)) == [jumped]
         self.keep(watch, 1000, base_ms=0)
@@ -74,53 +68,23 @@ class TestImu:
 
     def keep(self, watch, until_ms, base_ms=1000):
         for now_ms in range(20, until_ms + 1, 10):
-            watch.take(
-                now_ms * MS,
-                is_valid=True,
-                is_rate_usable=True,
-                reason="",
-                tick_ms=base_ms + now_ms,
-            )
+            sample(watch, now_ms, base_ms + now_ms)
 
     def test_the_very_first_sample_is_no_restart(self):
         watch = ImuWatch()
-        watch.take(0, is_valid=True, is_rate_usable=True, reason="", tick_ms=1000 + (0) // MS)
+        sample(watch, 0, 1000)
         assert list(watch.findings(0)) == []
 
     def test_ticks_far_beyond_the_wait_are_a_jump(self, watch):
-        watch.take(
-            10 * MS,
-            is_valid=True,
-            is_rate_usable=True,
-            reason="",
-            tick_ms=1210,
-        )
+        sample(watch, 10, 1210)
         assert list(watch.findings(10 * MS)) == []
-        watch.take(
-            30 * MS,
-            is_valid=True,
-            is_rate_usable=True,
-            reason="",
-            tick_ms=1431,
-        )
+        sample(watch, 30, 1431)
         assert list(watch.findings(30 * MS)) == [("imu_clock_jumped", "by 201 ms")]
 
     def test_ticks_that_the_line_held_up_are_none(self, watch):
-        watch.take(
-            600 * MS,
-            is_valid=True,
-            is_rate_usable=True,
-            reason="",
-            tick_ms=1800,
-        )
+        sample(watch, 600, 1800)
         assert list(watch.findings(600 * MS)) == []
-        watch.take(
-            1200 * MS,
-            is_valid=True,
-            is_rate_usable=True,
-            reason="",
-            tick_ms=2601,
-        )
+        sample(watch, 1200, 2601)
         assert list(watch.findings(1200 * MS)) == [("imu_clock_jumped", "by 201 ms")]
 
 
