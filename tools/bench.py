@@ -24,6 +24,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import cv2  # noqa: E402
 from bench import (  # noqa: E402
+    deaths,
     fault_flights,
     fresh_clone,
     house,
@@ -54,6 +55,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
         "stop": stop.measure,
+        "deaths": deaths.measure,
         "outage": outage.measure,
         "fault_flights": fault_flights.measure,
         "house": house.measure,
@@ -77,7 +79,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """THE TABLE of subjects, in the order of the page."""
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
-ON_REQUEST = frozenset({"fresh_clone", "fault_flights", *FOLDERS})
+ON_REQUEST = frozenset({"fresh_clone", "fault_flights", "deaths", *FOLDERS})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run as a file of its own
+from bench.processes import children, read
 from bench.rows import ROOT, Bench, Row
 
 RIG = Path("examples/rigs/two_mock_ups.toml")
@@ -169,7 +170,7 @@ def _groups(launcher: int) -> dict[str, tuple[int, ...]]:
     found: dict[str, list[int]] = {LAUNCHER: [launcher]}
 
     def visit(pid: int, group: str | None) -> None:
-        for child in _children(pid):
+        for child in children(pid):
             named = group or _group_of(child)
             found.setdefault(named, []).append(child)
             visit(child, EMULATOR if named == EMULATOR else None)
@@ -180,10 +181,10 @@ def _groups(launcher: int) -> dict[str, tuple[int, ...]]:
 
 def _group_of(pid: int) -> str:
     """By the name that a process gave itself, or the last word of its command line."""
-    words = _read(pid, "cmdline").split("\0")
+    words = read(pid, "cmdline").split("\0")
     if "firmware_emulator" in words:
         return EMULATOR
-    for name in (_read(pid, "comm").strip(), *reversed([word for word in words if word])):
+    for name in (read(pid, "comm").strip(), *reversed([word for word in words if word])):
         if name.endswith("_flight"):
             return "flights"
         if name.endswith("_sky"):
@@ -195,33 +196,17 @@ def _group_of(pid: int) -> str:
     return "others"
 
 
-def _children(pid: int) -> list[int]:
-    try:
-        tasks = list(Path(f"/proc/{pid}/task").iterdir())
-    except OSError:
-        return []
-    return [int(child) for task in tasks for child in _read(pid, f"task/{task.name}/children").split()]
-
-
-def _read(pid: int, name: str) -> str:
-    """A file of ``/proc/<pid>``; empty if the process is gone."""
-    try:
-        return Path(f"/proc/{pid}/{name}").read_text(errors="replace")
-    except OSError:
-        return ""
-
-
 def _cpu_s(pids: Iterable[int]) -> float:
     """User and system time of the processes themselves."""
     total = 0
     for pid in pids:
-        fields = _read(pid, "stat").rpartition(")")[2].split()
+        fields = read(pid, "stat").rpartition(")")[2].split()
         total += sum(map(int, fields[11:13]))  # utime, stime
     return total * _TICK_S
 
 
 def _pss_mb(pid: int) -> float:
-    for line in _read(pid, "smaps_rollup").splitlines():
+    for line in read(pid, "smaps_rollup").splitlines():
         if line.startswith("Pss:"):
             return int(line.split()[1]) / 1024
     return 0.0

@@ -4,22 +4,18 @@ The first press comes in flight, the others on the ground, released in between: 
 """
 
 import os
-import re
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from bench.rows import RIGS, ROOT, Bench, Row
+from bench.flying import flying, load
+from bench.rows import RIGS, Bench, Row
 from drivers.valve_bus import messages as bus
 from drivers.valve_bus.frame import CanFrame
 from drivers.valve_bus.protocol import decode
 from groundstation.launch.asking import ask_each
-from groundstation.launch.running import RunningRig, find_running
+from groundstation.launch.running import RunningRig
 from groundstation.launch.stop_button import stop_button
 from groundstation.parts.supervision.messages import StopPress
 from groundstation.parts.valves.messages import CanOut
@@ -29,7 +25,6 @@ RIG = RIGS / "two_mock_ups.toml"
 PRESSES = 40
 LIMIT_MS, AIM_MS = 20.0, 8.0
 BETWEEN_S = 0.4
-LOADING = "while True: pass"
 AUTHOR = "bench"
 
 
@@ -43,8 +38,11 @@ def measure(bench: Bench) -> list[Row]:
 
 def _row(bench: Bench, what: str, *, loads: int, is_judged: bool) -> Row:
     path = bench.folder / f"stop_{loads}.mcap"
-    with _flying(bench, str(path)) as run, _load(loads):
-        _press(bench, run, what)
+    with flying(bench, RIG, "--record", str(path)) as flight:
+        flight.wait_for(r"(\w+): flying", {"alpha", "beta"})
+        run = flight.rig
+        with load(loads):
+            _press(bench, run, what)
     ages_ms = np.array(_ages_ms(path))
     p50, p99 = np.percentile(ages_ms, (50, 99))
     return Row(
@@ -53,43 +51,6 @@ def _row(bench: Bench, what: str, *, loads: int, is_judged: bool) -> Row:
         f"{p99:.1f} ms (p50 {p50:.1f} ms, most {ages_ms.max():.1f} ms, {len(ages_ms)} frames)",
         bool(p99 <= LIMIT_MS and len(ages_ms) == PRESSES * len(run.vehicles)) if is_judged else None,
     )
-
-
-@contextmanager
-def _flying(bench: Bench, recording: str) -> Iterator[RunningRig]:
-    """A run in which every vehicle flies."""
-    command = [sys.executable, "-m", "groundstation", "run", str(RIG), "--headless", "--record", recording]
-    environment = os.environ | {
-        "XDG_RUNTIME_DIR": str(bench.folder),
-        "XDG_STATE_HOME": str(bench.folder / "state"),
-    }
-    os.environ["XDG_RUNTIME_DIR"] = str(bench.folder)  # where the run is looked for
-    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        waiting = {"alpha", "beta"}
-        for line in process.stdout:
-            bench.say(f"stop: {line.strip()[:100]}")
-            found = re.search(r"(\w+): flying", line)
-            if found is not None:
-                waiting.discard(found[1])
-            if not waiting:
-                break
-        try:
-            (run,) = [run for run in find_running() if run.pid == process.pid]
-            yield run
-        finally:
-            process.terminate()
-            process.communicate()
-
-
-@contextmanager
-def _load(count: int) -> Iterator[None]:
-    """So many processes that do nothing but compute."""
-    with ExitStack() as stack:
-        for _ in range(count):
-            loading = stack.enter_context(subprocess.Popen([sys.executable, "-c", LOADING]))
-            stack.callback(loading.kill)
-        yield
 
 
 def _press(bench: Bench, run: RunningRig, what: str) -> None:
