@@ -29,6 +29,7 @@ from bench import (  # noqa: E402
     fresh_clone,
     house,
     live,
+    live_faults,
     lockstep_speed,
     many_mock_ups,
     outage,
@@ -56,6 +57,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "live": live.measure,
         "stop": stop.measure,
         "deaths": deaths.measure,
+        "live_faults": live_faults.measure,
         "outage": outage.measure,
         "fault_flights": fault_flights.measure,
         "house": house.measure,
@@ -79,7 +81,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """THE TABLE of subjects, in the order of the page."""
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
-ON_REQUEST = frozenset({"fresh_clone", "fault_flights", "deaths", *FOLDERS})
+ON_REQUEST = frozenset({"fresh_clone", "fault_flights", "live_faults", "deaths", *FOLDERS})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:

@@ -35,7 +35,7 @@ RADIUS_M, OVERHANG_M = 0.2, 0.1
 ARMED_LATE_NS = 100_000_000
 AFLOAT_NS = 300_000_000
 """So long after it was disarmed the air may still be on: the order, the report."""
-HEALTHY = "healthy"
+HEALTHY, PUSHED, PUSH_S = "healthy", "pushed", 0.3
 RIG = """
 name = "fault campaign"
 valve_bus = "laboratory:valve_bus"
@@ -130,7 +130,9 @@ class Outcome:
 
 
 class Judge:
-    """Sees every message of one flight."""
+    """Sees the messages of one flight."""
+
+    KINDS = (ReferenceState, Supervision, Faults, ValveCommand, ValveStatus)
 
     def __init__(self, failure: str, start_s: float, valve: int | None) -> None:
         self.failure, self.start_ns, self.valve = failure, round(start_s * 1e9), valve
@@ -148,6 +150,7 @@ class Judge:
         self._command_ns = 0
 
     def __call__(self, delivered: Delivered, now_ns: int) -> None:
+        """A message of the flight, in the order in which they were published."""
         message = delivered.payload
         if isinstance(message, ReferenceState):
             self._place(message, now_ns)
@@ -195,6 +198,27 @@ class Judge:
             self._origin = self._origin or (x_m, y_m)
             self.excursion_m = max(self.excursion_m, math.dist(self._origin, (x_m, y_m)))
 
+    def outcome(self, seed: int) -> Outcome:
+        """What was seen."""
+        hits = {fault: ns for fault, ns in self.found.items() if fault in self.expected}
+        first = min(hits, key=lambda fault: hits[fault]) if hits else ""
+        return Outcome(
+            self.failure,
+            seed,
+            self.start_ns * 1e-9,
+            first,
+            (hits[first] - self.start_ns) * 1e-9 if first else math.nan,
+            self.commanded_ms * 1e-3,
+            tuple(sorted(self.before)),
+            tuple(sorted(self.found.keys() - self.expected)),
+            self.left_table,
+            self.hit_neighbour,
+            self.floated_unarmed,
+            self.open_when_disarmed,
+            self.excursion_m,
+            str(self.mode),
+        )
+
 
 def parameters_of(failure: str, rng: np.random.Generator) -> dict[str, float]:
     """Parameters of a failure, drawn where the place matters and large enough to matter."""
@@ -214,22 +238,33 @@ def parameters_of(failure: str, rng: np.random.Generator) -> dict[str, float]:
     }.get(failure, {})
 
 
-def fly(failure: str, seed: int, after_s: float = AFTER_S) -> Outcome:
-    """Fly once, for so long after the failure."""
+def drawn(failure: str, seed: int) -> tuple[np.random.Generator, str, dict[str, float]]:
+    """What a seed decides: the generator for the rest, the rig, the parameters of the failure."""
     rng = np.random.default_rng([seed, *failure.encode()])
     start_s = float(rng.uniform(EARLIEST_S, LATEST_S))
     tilt = rng.uniform(-3e-4, 3e-4, 2)
     text = RIG.replace("TILT_X", f"{tilt[0]:.2e}").replace("TILT_Y", f"{tilt[1]:.2e}")
     given = parameters_of(failure, rng)
+    return rng, text, {"start_s": start_s, **given}
+
+
+def valve_of(given: dict[str, float]) -> int | None:
+    """Valve that fails; None where none does."""
+    return int(given["valve"]) if "valve" in given else None
+
+
+def fly(failure: str, seed: int, after_s: float = AFTER_S) -> Outcome:
+    """Fly once, for so long after the failure."""
+    rng, text, given = drawn(failure, seed)
+    start_s = given.pop("start_s")
     if failure != HEALTHY:
         inner = ", ".join(f"{name} = {value}" for name, value in given.items())
-        lasts = f"end_s = {start_s + 0.3:.3f}\n" if failure == "pushed" else ""
+        lasts = f"end_s = {start_s + PUSH_S:.3f}\n" if failure == PUSHED else ""
         text += (
             f'\n[[laboratory.failures]]\nkind = "{failure}"\nvehicle = "alpha"\nstart_s = {start_s:.3f}\n'
             f"{lasts}parameters = {{ {inner} }}\n"
         )
-    valve = int(given["valve"]) if "valve" in given else None
-    judge = Judge(failure, start_s, valve)
+    judge = Judge(failure, start_s, valve_of(given))
     runner = make_runner(
         parse_rig(text, Path("campaign.toml")),
         seed,
@@ -241,37 +276,24 @@ def fly(failure: str, seed: int, after_s: float = AFTER_S) -> Outcome:
         runner.run(round((start_s + after_s) * 1e9))
     finally:
         runner.close()
-    hits = {fault: ns for fault, ns in judge.found.items() if fault in judge.expected}
-    first = min(hits, key=lambda fault: hits[fault]) if hits else ""
-    return Outcome(
-        failure,
-        seed,
-        start_s,
-        first,
-        (hits[first] - judge.start_ns) * 1e-9 if first else math.nan,
-        judge.commanded_ms * 1e-3,
-        tuple(sorted(judge.before)),
-        tuple(sorted(judge.found.keys() - judge.expected)),
-        judge.left_table,
-        judge.hit_neighbour,
-        judge.floated_unarmed,
-        judge.open_when_disarmed,
-        judge.excursion_m,
-        str(judge.mode),
-    )
+    return judge.outcome(seed)
 
 
 def _laps(rng: np.random.Generator, until_s: float) -> Iterator[Request]:
     """To and fro past the neighbour, at the speed that the controller chooses."""
     for number in range(int((until_s - 10.0) / LEG_S)):
-        side = 1.0 if number % 2 else -1.0
-        goal = {
-            "x_m": 0.1 if number % 2 else -0.9,
-            "y_m": side * float(rng.uniform(0.2, 0.5)),
-            "heading_rad": float(rng.uniform(-3.0, 3.0)),
-        }
         stamp_ns = round((10.0 + LEG_S * number) * 1e9)
-        yield Request(stamp_ns, "alpha", number + 1, "campaign", "go_to", json.dumps(goal))
+        yield Request(stamp_ns, "alpha", number + 1, "campaign", "go_to", json.dumps(goal_of(number, rng)))
+
+
+def goal_of(number: int, rng: np.random.Generator) -> dict[str, float]:
+    """End of a leg: arguments of `go_to`."""
+    side = 1.0 if number % 2 else -1.0
+    return {
+        "x_m": 0.1 if number % 2 else -0.9,
+        "y_m": side * float(rng.uniform(0.2, 0.5)),
+        "heading_rad": float(rng.uniform(-3.0, 3.0)),
+    }
 
 
 def failures() -> tuple[str, ...]:

@@ -37,8 +37,10 @@ LAUNCHER, ALL = "launcher", "all"
 LATEST_KILL_S = 3.5
 """Drawn up to here after the request: while it brakes, holds, lands, and when it has landed."""
 LANDED_WITHIN_S = 12.0
+RESTARTED_S = 6.0
+"""So long a process needs at most until it is there again and rules."""
 AFTER_S = 2.5
-"""So long is watched after all processes are ready again."""
+"""So long is watched after all processes of a new launcher are ready."""
 MOVED_M = 2e-3
 AUTHOR = "bench"
 
@@ -173,8 +175,7 @@ def _die(bench: Bench, rig: Path, closing: str, victim: str, after_s: float) -> 
         _watch(endpoint, seen, after_s)
         _kill(flight, victim)
         if victim not in (LAUNCHER, ALL):
-            flight.wait_for("all processes are ready")
-            _watch(endpoint, seen, AFTER_S)
+            _watch(endpoint, seen, RESTARTED_S)
             _watch(endpoint, seen, LANDED_WITHIN_S, until_landed=True)
             return _let_go(endpoint, seen)
     with flying(bench, rig) as flight:
