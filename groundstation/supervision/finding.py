@@ -10,7 +10,9 @@ class Finding:
     Attributes:
         id: Of the fault in the fault table.
         detail: Which part, how much, and what it cannot be told apart from.
+        whose: What it befalls, where the fault does not say it; two findings of one valve agree in it.
     """
 
     id: str
     detail: str
+    whose: str = ""

@@ -32,7 +32,6 @@ class ImuConsistencyConfig:
         innovation_factor: Of the covariance of the innovations, where the filter is wrong.
         gate_nis: Beyond it a fix is refused: innovations of used fixes end there.
         zero_drift_rad_s: Farthest an estimated zero of the gyro goes in `drift_s`.
-        force_drift_m_s2: Likewise of the accelerometers.
         drift_s: See there.
         false_alarm_chance: Of any false alarm in `fixes` fixes: 0.01 in 10 h at 15 Hz.
         fixes: See there.
@@ -49,7 +48,6 @@ class ImuConsistencyConfig:
     innovation_factor: float = 3.0
     gate_nis: float = 25.0
     zero_drift_rad_s: float = 5e-3
-    force_drift_m_s2: float = 1e-2
     drift_s: float = 5.0
     false_alarm_chance: float = 0.01
     fixes: float = 540_000.0
@@ -100,7 +98,7 @@ class ImuConsistency:
         self._turned_rad = 0.0
         self._turns: list[tuple[int, float]] = []  # stamp, turn since the start by the gyro
         self._headings: dict[str, Heading] = {}
-        self._zeros: list[tuple[int, float, float, float]] = []
+        self._zeros: list[tuple[int, float]] = []
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -125,13 +123,14 @@ class ImuConsistency:
         if stamp_ns - self._turns[0][0] > 2e9 * _LONGEST_GAP_S:
             del self._turns[: len(self._turns) // 2]
 
-    def fix(self, source: str, stamp_ns: int, heading_rad: float) -> None:
+    def fix(self, source: str, stamp_ns: int, heading_rad: float, stamp_sigma_s: float = 0.0) -> None:
         """Take a fix that has a pose, believed or not.
 
         Args:
             source: Whose.
             stamp_ns: Its exposure.
             heading_rad: As it states.
+            stamp_sigma_s: Of its exposure, as it states; what `config` states adds to it.
         """
         turned = self._turned_at(stamp_ns)
         if turned is None:
@@ -142,7 +141,8 @@ class ImuConsistency:
             return
         config = self._config
         by_gyro = turned - heading.turned_rad
-        noise = config.heading_sigma_rad**2 + (config.stamp_sigma_s * by_gyro / span_s) ** 2
+        stamp_variance_s2 = config.stamp_sigma_s**2 + stamp_sigma_s**2
+        noise = config.heading_sigma_rad**2 + stamp_variance_s2 * (by_gyro / span_s) ** 2
         if math.isinf(heading.variance):
             heading.variance = noise
         prior = (
@@ -188,7 +188,7 @@ class ImuConsistency:
         """
         sums = self._sources.setdefault(source, _Source())
         if used and reason == RESTARTED:
-            self._explain(source, sums, "the estimate had to begin again")
+            self._explain("wrong_fixes", source, sums, "the estimate had to begin again")
             return
         if used:
             sums.run = 0
@@ -204,29 +204,27 @@ class ImuConsistency:
             sums.refused += self._refused_adds
             self._keep(sums, innovation)
         if sums.refused > self.threshold:
-            self._explain(source, sums, f"{sums.run} fixes in a row refused")
+            self._explain("wrong_fixes", source, sums, f"{sums.run} fixes in a row refused")
         elif sums.scatter > self.threshold:
-            self._explain(source, sums, "innovations beyond their covariance")
+            # used, and leaning: an unmapped table does that, and nothing is wrong that landing would mend
+            self._explain("filter_inconsistent", source, sums, "innovations beyond their covariance")
 
-    def zeros(self, now_ns: int, rate_rad_s: float, force_m_s2: tuple[float, float]) -> None:
-        """Take the zeros that the estimator subtracts.
+    def zero(self, now_ns: int, rate_rad_s: float) -> None:
+        """Take the zero of the gyro that the estimator subtracts.
+
+        Waves of the table move what it takes for those of the accelerometers: they are not judged here.
 
         Args:
-            now_ns: When it stated them.
-            rate_rad_s: Of the gyro.
-            force_m_s2: Of the accelerometers.
+            now_ns: When it stated it.
+            rate_rad_s: The zero.
         """
         config = self._config
-        self._zeros.append((now_ns, rate_rad_s, *force_m_s2))
+        self._zeros.append((now_ns, rate_rad_s))
         while now_ns - self._zeros[0][0] > config.drift_s * 1e9:
             self._zeros.pop(0)
-        then = self._zeros[0]
-        turned = abs(rate_rad_s - then[1])
+        turned = abs(rate_rad_s - self._zeros[0][1])
         if turned > config.zero_drift_rad_s:
             self._find("imu_shifted", f"the gyro's zero moved by {math.degrees(turned):.2f} deg/s")
-        pulled = math.hypot(force_m_s2[0] - then[2], force_m_s2[1] - then[3])
-        if pulled > config.force_drift_m_s2:
-            self._find("imu_shifted", f"the accelerometers' zero moved by {1e3 * pulled:.0f} mm/s^2")
 
     def _turned_at(self, stamp_ns: int) -> float | None:
         """Turn by the gyro up to a moment; None where samples do not reach."""
@@ -256,7 +254,7 @@ class ImuConsistency:
         if all(map(math.isfinite, innovation)):
             sums.innovations = [*sums.innovations[1 - _KEPT :], innovation]
 
-    def _explain(self, source: str, sums: _Source, what: str) -> None:
+    def _explain(self, fault: str, source: str, sums: _Source, what: str) -> None:
         """Fixes that all lie to one side speak against the estimate, others against the fixes."""
         kept = sums.innovations
         x, y = sum(each[0] for each in kept), sum(each[1] for each in kept)
@@ -270,9 +268,9 @@ class ImuConsistency:
             detail = (
                 f"{source}: {what}, all {mean:.0f} mm to one side: the IMU shifted, or all fixes are wrong"
             )
-            self._find("wrong_fixes", detail)
+            self._find(fault, detail)
         else:
-            self._find("wrong_fixes", f"{source}: {what}")
+            self._find(fault, f"{source}: {what}")
 
     def _find(self, fault: str, detail: str) -> None:
         self._found.setdefault(fault, Finding(fault, detail))

@@ -262,7 +262,7 @@ def _unbounded(case: Suspicion) -> float:
 
 def _named(best: Suspicion, rivals: list[Suspicion], all_weak: bool) -> Finding:
     if best.kind is Kind.WEAK and all_weak:
-        return Finding("valve_weak", "most valves at half thrust or less: supply pressure")
+        return Finding("valve_weak", "most valves at half thrust or less: supply pressure", "most valves")
     what = {
         Kind.CLOSED: "gives no thrust when commanded",
         Kind.WEAK: "gives half its thrust or less",
@@ -270,8 +270,9 @@ def _named(best: Suspicion, rivals: list[Suspicion], all_weak: bool) -> Finding:
         Kind.LEAK: "gives a part of its thrust that was not commanded",
     }[best.kind]
     kind = Kind.OPEN if best.kind is Kind.LEAK else best.kind
-    detail = f"valve {best.valve} {what} ({best.thrust_s:.2f} s of it)"
+    whose = f"valve {best.valve}"
+    detail = f"{whose} {what} ({best.thrust_s:.2f} s of it)"
     others = sorted({f"{case.valve} ({case.kind.value})" for case in rivals if case.valve != best.valve})
     if others:
         detail += f"; cannot be told apart from valve {', '.join(others)}"
-    return Finding(kind.value, detail)
+    return Finding(kind.value, detail, whose)

@@ -53,7 +53,7 @@ class Watcher(Node):
             case FusionStatus():
                 self._zeros = message
                 if self._flies(now_ns):
-                    self.imu.zeros(now_ns, message.bias_rate_rad_s, message.bias_force_m_s2)
+                    self.imu.zero(now_ns, message.bias_rate_rad_s)
             case ValveStatus():
                 if not message.floating:
                     self._floats_since_ns = None

@@ -7,6 +7,9 @@ from pydantic import Field
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import Delay, NonNegative, Positive, Section
 
+WAKING_S = 0.004
+"""Until a process that waits for bytes runs, on a quiet machine."""
+
 
 class ImuSection(Section):
     """The IMU block: its line, its place and the white noise of its sensors as densities.
@@ -30,6 +33,11 @@ class ImuSection(Section):
     gyro_bandwidth_hz: NonNegative = 0.0
     acc_bandwidth_hz: NonNegative = 0.0
     calibration: tuple[RigFile, ...] = ()
+
+    @property
+    def usual_spread_s(self) -> float:
+        """By how much the lateness of samples varies on a quiet machine."""
+        return self.ftdi_latency_s + WAKING_S
 
 
 class ImuOfType(Section):

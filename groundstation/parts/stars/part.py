@@ -8,6 +8,7 @@ from groundstation.declarations.node import FLIGHT, SKY, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import Rig, check_address
+from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.fix_reader import FixReader
 from groundstation.parts.stars.gauges import GAUGES
@@ -59,7 +60,8 @@ def _floor(rig: Rig, vehicle: str) -> Floor:
 
 def _fix_reader(rig: Rig, vehicle: str) -> Node:
     camera = rig.of_type(vehicle, StarsOfType).star_camera
-    return FixReader(vehicle, camera.delay[1] if camera is not None else 0.0)
+    stamp_sigma_s = camera.delay[1] if camera is not None else 0.0
+    return FixReader(vehicle, stamp_sigma_s, rig.of_type(vehicle, ImuOfType).imu.usual_spread_s)
 
 
 def _spot_finder(rig: Rig, vehicle: str) -> Node:

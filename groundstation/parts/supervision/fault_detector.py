@@ -6,6 +6,7 @@ from typing import NamedTuple
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
+from groundstation.fusion.hold_up import HoldUp
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.supervision.messages import Findings, Supervision
@@ -19,8 +20,8 @@ PERIOD_NS = 50_000_000
 REPEAT_NS = 200_000_000
 NODE_NS = 70_000_000
 """A node whose newest status is older may not have received the commands, which then explain nothing."""
-LATE_NS = 100_000_000
-"""A sample that arrives later comes by a line or a machine that is held up, and so do commands."""
+HELD_UP_S = 0.03
+"""Samples that are later than usual by more come by a line or a machine that is held up; so do commands."""
 LONGEST_HOLE_MS, DISTURBED_NS = 60, 2_000_000_000
 """After a longer hole between samples nothing is judged for a while: filter and stamps settle."""
 MOST_BEHIND, COUNTER_MODULUS = 3, 16
@@ -29,11 +30,7 @@ WITNESS_NS = 10_000_000_000
 """So long the first finding about a valve waits for a second one that agrees."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
-PUSHED, WRONG_FIXES, LEANING = "pushed", "wrong_fixes", "beyond their covariance"
-NO_FORCE = (0.0, 0.0)
-"""Waves of the table move what the filter takes for their zeros; the check of the valves finds steps."""
-INCONSISTENT = "filter_inconsistent"
-"""Fixes that are used and lean: an unmapped table does that, and nothing is wrong that landing would mend."""
+PUSHED = "pushed"
 
 
 class _Suspect(NamedTuple):
@@ -54,6 +51,7 @@ class FaultDetector(Node):
         fixes: Classes of the fixes that fusion takes, with the names of their sources.
         valves: Compares motion with commands.
         imu: Compares the gyro with fixes.
+        hold_up: Follows how late samples come.
     """
 
     inputs: tuple[type[Message], ...] = (
@@ -67,6 +65,7 @@ class FaultDetector(Node):
         fixes: dict[type[PoseFix], str],
         valves: ValveConsistency,
         imu: ImuConsistency,
+        hold_up: HoldUp,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self.inputs = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, *fixes)
@@ -75,6 +74,7 @@ class FaultDetector(Node):
         self._fix_watch = FixWatch()
         self._valves = valves
         self._imu = imu
+        self._hold_up = hold_up
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
         self._node_ns = self._sent = 0
@@ -105,7 +105,7 @@ class FaultDetector(Node):
                 self._zeros = message.bias_rate_rad_s, message.bias_force_m_s2
                 self._has_rested = message.rest_s > 0.0
                 if self._is_carried(now_ns):
-                    self._imu.zeros(now_ns, self._zeros[0], NO_FORCE)
+                    self._imu.zero(now_ns, self._zeros[0])
             case Supervision():
                 self._follow(message, now_ns)
 
@@ -137,9 +137,10 @@ class FaultDetector(Node):
             reason=imu.reason,
             tick_ms=imu.tick_ms,
         )
+        self._hold_up.sample(now_ns, imu.stamp_ns)
         if not (imu.valid and self._is_carried(now_ns)):
             return False
-        if now_ns - imu.stamp_ns > LATE_NS or imu.elapsed_ms > LONGEST_HOLE_MS:
+        if imu.elapsed_ms > LONGEST_HOLE_MS or self._hold_up.excess_s(now_ns) > HELD_UP_S:
             self._disturbed_ns = now_ns
             self._imu.reset()
             self._begin_again()
@@ -161,8 +162,7 @@ class FaultDetector(Node):
         for finding in self._valves.findings(now_ns):
             if finding.id == PUSHED:
                 continue
-            is_of_valve = finding.id.startswith("valve_")  # closed or weak: the same valve is what counts
-            whose = finding.detail.partition(" give")[0] if is_of_valve else finding.id
+            whose = finding.whose or finding.id  # closed or weak: the same valve is what counts
             before, self._suspect = self._suspect, _Suspect(whose, now_ns)
             if before.whose != whose or now_ns - before.since_ns > WITNESS_NS:
                 self._begin_again()
@@ -173,7 +173,7 @@ class FaultDetector(Node):
         if not fix.fix:
             self._fix_watch.take_picture(now_ns, str(getattr(fix, "reason", "")))
         elif self._is_carried(now_ns):
-            self._imu.fix(self._sources[type(fix)], fix.stamp_ns, fix.heading_rad)
+            self._imu.fix(self._sources[type(fix)], fix.stamp_ns, fix.heading_rad, fix.stamp_sigma_s)
 
     def _account(self, account: FixAccount, now_ns: int) -> None:
         self._fix_watch.take_account(now_ns, account.stamp_ns, is_used=account.used, reason=account.reason)
@@ -190,8 +190,7 @@ class FaultDetector(Node):
         found = dict(self._imu_watch.findings(now_ns))
         found.update(self._fix_watch.findings(now_ns))
         for finding in (*self._valves.findings(now_ns), *self._imu.findings):
-            leans = finding.id == WRONG_FIXES and LEANING in finding.detail
-            found[INCONSISTENT if leans else finding.id] = finding.detail
+            found[finding.id] = finding.detail
         ids = tuple(found)
         if ids != self._published or now_ns - self._published_ns >= REPEAT_NS:
             self._published, self._published_ns = ids, now_ns

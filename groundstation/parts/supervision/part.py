@@ -5,6 +5,7 @@ from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Wei
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION, Rig
+from groundstation.fusion.hold_up import HoldUp
 from groundstation.fusion.noise import lag_of_bandwidth
 from groundstation.parts.control.sections import neighbours_of
 from groundstation.parts.fusion.sections import FusionOfType, fused_sources
@@ -79,7 +80,13 @@ def _detector(rig: Rig, vehicle: str) -> Node:
     gyro = ImuConsistencyConfig(
         gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz, heading_sigma_rad=heading_sigma_rad
     )
-    return FaultDetector(vehicle, sources, ValveConsistency(type_.model(), valves), ImuConsistency(gyro))
+    return FaultDetector(
+        vehicle,
+        sources,
+        ValveConsistency(type_.model(), valves),
+        ImuConsistency(gyro),
+        HoldUp(imu.usual_spread_s),
+    )
 
 
 def _memory(rig: Rig, vehicle: str) -> Port:
