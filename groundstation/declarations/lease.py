@@ -11,6 +11,8 @@ from groundstation.declarations.message import I64, PACKAGE, Message, Text
 from groundstation.declarations.request import Request
 from groundstation.declarations.topic import Rank, Scope, Topic
 
+LONGEST_S = 3600.0
+"""A lease ends after so long at the latest, unless it is taken again."""
 FREE_FOR_ALL = frozenset({"stop", "land", "disarm", "float_off", "brake"})
 """Actions that take motion away: whoever holds control, anyone may ask for them."""
 

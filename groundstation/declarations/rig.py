@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 LABORATORY = "laboratory:"
 """Addresses that begin so are resolved by what the emulated laboratory announces."""
-STATION = "station:"
+STATION_CHANNEL = "station:"
 """Addresses that begin so are the launcher's to resolve; there are none in virtual time."""
 MOCK_UP_RADIUS_M = 0.2  # a mock-up keeps this far from the edge of the table
 

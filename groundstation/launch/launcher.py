@@ -21,7 +21,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
 from groundstation.declarations.names import LABORATORY, RECORDER
 from groundstation.declarations.node import COMMANDS
-from groundstation.declarations.rig import STATION, Rig
+from groundstation.declarations.rig import STATION_CHANNEL, Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
 from groundstation.launch.fork_server import ForkServer
@@ -256,7 +256,7 @@ class Launcher:
             child.started_s = self._time.now_s
             child.write(
                 pickle.dumps(
-                    Go({**self._addresses, f"{STATION}memory": self._memory.address(child.restarts)})
+                    Go({**self._addresses, f"{STATION_CHANNEL}memory": self._memory.address(child.restarts)})
                 )
             )
         self._waiting.clear()

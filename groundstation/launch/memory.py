@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.declarations.errors import GroundStationError
-from groundstation.parts.supervision.memory import EXPECTED
+from groundstation.declarations.kept_file import EXPECTED
 
 MOST_RUNS = 64
 """Of one emulated rig at a time."""

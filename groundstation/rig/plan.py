@@ -11,7 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.names import OF_THE_BUS, process_trouble
 from groundstation.declarations.node import COMMANDS, Node, NodeRow, Weight
 from groundstation.declarations.port import Port
-from groundstation.declarations.rig import LABORATORY, STATION, Rig
+from groundstation.declarations.rig import LABORATORY, STATION_CHANNEL, Rig
 from groundstation.declarations.topic import Scope
 
 
@@ -194,7 +194,7 @@ def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
     found = []
     for port, _ in ports_of(rig):
         address = port.address
-        if isinstance(address, str) and address.startswith(STATION):
+        if isinstance(address, str) and address.startswith(STATION_CHANNEL):
             continue
         if not isinstance(address, str) or not address.startswith(LABORATORY):
             raise RigError(f"{port.channel}: {address!r} is real hardware, which runs in real time only")
@@ -217,7 +217,7 @@ def resolved_ports(rig: Rig, process: str, addresses: Mapping[str, object]) -> l
         if home != process:
             continue
         address = port.address
-        if isinstance(address, str) and address.startswith(STATION):
+        if isinstance(address, str) and address.startswith(STATION_CHANNEL):
             address = addresses[address]
         elif isinstance(address, str) and address.startswith(LABORATORY):
             channel = address.removeprefix(LABORATORY)

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 
-from groundstation.declarations.lease import Lease, held_words
+from groundstation.declarations.lease import LONGEST_S, Lease, held_words
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Action, Argument, ArgumentError, Request, answer, table_of
+from groundstation.parts.operation.lease_memory import lease_of
+from groundstation.parts.operation.messages import KeptLease
 
-LONGEST_S = 3600.0
 USUAL_S = 600.0
 
 ACTIONS = table_of(
@@ -30,13 +31,13 @@ ACTIONS = table_of(
 
 
 class LeaseDesk(Node):
-    """Publishes the lease at its start (nobody's) and whenever it changes.
+    """Publishes the lease that was kept on disk, and whenever it changes.
 
     Args:
         vehicles: Requests may name any of them, or none: the lease is the rig's.
     """
 
-    inputs = (Request,)
+    inputs = (Request, KeptLease)
     outputs = (Lease, Ack)
 
     def __init__(self, vehicles: tuple[str, ...]) -> None:
@@ -48,10 +49,10 @@ class LeaseDesk(Node):
         del payload
         return (*self._vehicles, "")
 
-    def start(self, now_ns: int) -> Iterator[Message]:
-        yield self._grant(now_ns, "", 0)
-
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
+        if isinstance(message, KeptLease):
+            self._lease = lease_of(message)
+            yield self._lease
         if not isinstance(message, Request) or message.action not in ACTIONS:
             return
         before = self._lease

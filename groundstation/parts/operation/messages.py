@@ -13,7 +13,7 @@ from groundstation.declarations.message import (
     Text,
     TextSequence,
 )
-from groundstation.declarations.topic import Scope, Topic
+from groundstation.declarations.topic import Rank, Scope, Topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +33,19 @@ class RecorderStatus(Message):
     written_bytes: U64
     free_bytes: U64
     room_s: F64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptLease(Message):
+    """What was kept on disk of the control lease, at the start of the process.
+
+    Attributes:
+        content: JSON object; empty where nothing was kept.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/KeptLease"
+    TOPIC: ClassVar = Topic("kept_lease", rank=Rank.REQUEST, scope=Scope.RIG)
+    content: Text
 
 
 @dataclass(frozen=True, slots=True, eq=False)

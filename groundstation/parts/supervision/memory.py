@@ -5,19 +5,15 @@ virtual time and in replays there is no such port.
 """
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
+from groundstation.declarations.kept_file import EXPECTED, MemoryEdge, file_at
 from groundstation.declarations.message import Message
-from groundstation.declarations.port import READ_TIMEOUT_S, Edge, Port
+from groundstation.declarations.port import Edge, Port
 from groundstation.parts.supervision.messages import Recalled, Supervision
 from groundstation.supervision.mode_machine import Memory, Then
 from groundstation.supervision.modes import Mode
-
-EXPECTED = "expected"
-"""Behind the folder's address and a question mark: a process that starts again must find what was kept."""
 
 
 def text_of(ruling: Supervision) -> str:
@@ -60,33 +56,6 @@ def _unreadable(why: str, stamp_ns: int) -> Memory:
     return Memory(Mode.LANDING, True, False, Then.LAND, why, "", stamp_ns)
 
 
-class _MemoryEdge(Edge):
-    def __init__(self, path: Path, *, is_expected: bool) -> None:
-        from drivers.memory_file import MemoryFile
-
-        self._path, self._is_expected = path, is_expected
-        self._file = MemoryFile(path)
-
-    def read(self) -> Iterable[tuple[int, object]]:
-        found = self._file.read(READ_TIMEOUT_S)
-        if found is None:
-            return ()
-        stamp_ns, text, trouble = found
-        if self._is_expected and not text:
-            trouble = trouble or f"{self._path} is gone or empty: what was kept there is lost"
-        return ((stamp_ns, (text, trouble)),)
-
-    def write(self, data: object) -> None:
-        assert isinstance(data, str)
-        self._file.write(data)
-
-    def wake(self) -> None:
-        self._file.wake()
-
-    def close(self) -> None:
-        self._file.wake()
-
-
 @dataclass(frozen=True)
 class MemoryPort(Port):
     """The last ruling, as it was kept, and the present one, to be kept; delivered before anything else."""
@@ -107,5 +76,5 @@ class MemoryPort(Port):
         return text_of(payload)
 
     def open(self) -> Edge:
-        folder, _, word = str(self.address).partition("?")
-        return _MemoryEdge(Path(folder) / f"{self.vehicle}.json", is_expected=word == EXPECTED)
+        is_expected = str(self.address).partition("?")[2] == EXPECTED
+        return MemoryEdge(file_at(self.address, self.vehicle), is_expected=is_expected)

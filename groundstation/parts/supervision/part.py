@@ -4,7 +4,7 @@ from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
-from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION, Rig
+from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION_CHANNEL, Rig
 from groundstation.fusion.hold_up import HoldUp
 from groundstation.fusion.noise import lag_of_bandwidth
 from groundstation.parts.control.sections import neighbours_of
@@ -91,7 +91,7 @@ def _detector(rig: Rig, vehicle: str) -> Node:
 
 def _memory(rig: Rig, vehicle: str) -> Port:
     del rig
-    return MemoryPort(f"{vehicle}/memory", vehicle, f"{STATION}memory")
+    return MemoryPort(f"{vehicle}/memory", vehicle, f"{STATION_CHANNEL}memory")
 
 
 PART = Part(

@@ -82,6 +82,12 @@ def test_one_holds_control_and_anyone_may_stop(launch, two_drawn):
     refused = run.request("alpha", "go_to", "0", "0", "0", "--as", "bob")
     assert refused.returncode == 1
     assert "control is held by anna for another 0:0" in refused.stdout
+    run.forget()
+    os.kill(run.pids()["station"], signal.SIGKILL)  # who granted it
+    run.wait_for("all processes are ready")
+    taken = run.request("alpha", "take_control", "300", "--as", "bob")
+    assert taken.returncode == 1
+    assert "control is held by anna for another 0:0" in taken.stdout
     assert run.request("alpha", "go_to", "-0.5", "0", "0", "--as", "anna").returncode == 0
     assert run.request("alpha", "give_control", "bob", "--as", "anna").returncode == 0
     assert run.request("alpha", "go_to", "-0.6", "0", "0", "--as", "anna").returncode == 1

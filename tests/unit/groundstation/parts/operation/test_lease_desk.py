@@ -8,6 +8,8 @@ from groundstation.declarations.lease import FREE_FOR_ALL, Lease, LeaseCheck
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.laboratory.failure_desk import FailureDesk
 from groundstation.parts.operation.lease_desk import LeaseDesk
+from groundstation.parts.operation.lease_memory import LeasePort, text_of
+from groundstation.parts.operation.messages import KeptLease
 from groundstation.parts.table import own_tables
 
 S = 1_000_000_000
@@ -19,7 +21,10 @@ class Desk:
     def __init__(self):
         self.node = LeaseDesk(("alpha",))
         self.check = LeaseCheck()
-        self._take(self.node.start(0))
+        self.lease = None
+
+    def recall(self, t_s, content):
+        self._take(self.node.receive(KeptLease(t_s * S, "", content), t_s * S))
 
     def _take(self, made):
         reason = None
@@ -46,6 +51,9 @@ def desk():
 
 
 def test_while_nobody_holds_control_anyone_may_ask(desk):
+    assert desk.lease is None
+    assert desk.objection(1, "bob", "go_to") == ""
+    desk.recall(1, "")
     assert desk.lease.holder == ""
     assert desk.objection(1, "bob", "go_to") == ""
     assert LeaseCheck().objection(Request(0, "alpha", 1, "bob", "go_to", "{}"), 0) == ""
@@ -122,7 +130,7 @@ def test_an_expired_lease_cannot_be_handed_on_but_given_back(desk):
 )
 def test_what_cannot_be_granted_is_refused(desk, author, arguments, reason):
     assert reason in desk.ask(10, author, "take_control", **arguments)
-    assert desk.lease.holder == ""
+    assert desk.lease is None
 
 
 def test_other_requests_are_not_the_desks(desk):
@@ -146,3 +154,52 @@ def test_a_failure_is_not_injected_for_somebody_who_does_not_hold_control():
     assert ack.reason.startswith("control is held by anna for another 0:00:59")
     (order,) = desk.receive(Request(S, "alpha", 1, "anna", "inject", arguments), S)
     assert order.failure == "dead_sky"
+
+
+def test_a_lease_outlives_the_process_that_granted_it(desk):
+    assert desk.ask(10, "anna", "take_control", for_s=600.0) == ""
+    another = Desk()
+    another.recall(20, text_of(desk.lease))
+    assert another.lease.holder == "anna"
+    assert another.objection(20, "bob", "go_to") == desk.objection(20, "bob", "go_to")
+    assert "give_control" in another.ask(21, "bob", "take_control")
+    assert another.ask(22, "anna", "give_control", to="bob") == ""
+    assert another.objection(23, "bob", "go_to") == ""
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[" * 100_000,
+        "[]",
+        "null",
+        '{"holder": "anna"}',
+        '{"stamp_ns": "soon", "holder": "anna", "expires_ns": 5, "reason": ""}',
+        '{"stamp_ns": 1e400, "holder": "anna", "expires_ns": 5, "reason": ""}',
+        text_of(Lease(900 * S, "", "anna", 1500 * S, "")),  # granted before the host was started again
+        text_of(Lease(100 * S, "", "anna", 9000 * S, "")),
+        text_of(Lease(-S, "", "anna", 200 * S, "")),
+    ],
+)
+def test_what_cannot_be_a_lease_of_now_is_nobodys(desk, content):
+    desk.recall(100, content)
+    assert desk.lease.holder == ""
+    assert desk.objection(101, "bob", "go_to") == ""
+
+
+def test_the_port_keeps_the_lease_and_reads_it_again(tmp_path):
+    lease = Lease(7, "", "anna", 99 * S, "asleep")
+    port = LeasePort("lease", "", f"{tmp_path}?expected")
+    edge = port.open()
+    ((_, data),) = edge.read()
+    assert port.to_message(5, data).content == ""
+    edge.write(port.to_device(lease))
+    edge.close()
+    edge = port.open()
+    ((stamp_ns, data),) = edge.read()
+    edge.close()
+    message = port.to_message(stamp_ns, data)
+    assert message.content == text_of(lease)
+    assert port.writes() == ((Lease, ""),)
