@@ -19,7 +19,8 @@ from groundstation.runners.replay_node import NodeFactory, ReplayedNode
 from groundstation.runners.replay_report import ReplayReport
 from groundstation.runners.tolerances import EXACT, Tolerances
 
-LOOK_AHEAD_NS = 2_000_000_000  # a recorder may log a message later than the process that consumed it
+LOOK_AHEAD_NS = 2_000_000_000
+"""A recorder may log a message by so much later than the journal of the process that consumed it."""
 
 
 def recorded_nodes(recording: Recording) -> tuple[str, ...]:
@@ -86,7 +87,7 @@ class ReplayRunner:
         self._replayed_nodes = {key: ReplayedNode(key, node) for key, node in prepared.items()}
         self._report = ReplayReport(tuple(prepared), refused)
         self._comparison = Comparison(tolerances, output)
-        self._backlog: deque[Journal] = deque()
+        self._backlog: deque[tuple[Journal, int]] = deque()
         received = {kind for node in prepared.values() for kind in node.inputs}
         published = {kind for node in prepared.values() for kind in node.outputs}
         self._published = {kind.TOPIC.noun for kind in published}
@@ -103,7 +104,7 @@ class ReplayRunner:
         given_ns = 0
         while self._pull():
             while self._backlog:
-                self._follow(self._backlog.popleft())
+                self._follow(*self._backlog.popleft())
             if progress is not None and self._log_ns >= given_ns:
                 progress(self._log_ns)
                 given_ns = self._log_ns + 1_000_000_000
@@ -131,7 +132,7 @@ class ReplayRunner:
         if envelope.topic.noun == Journal.TOPIC.noun:
             journal = message.payload
             assert isinstance(journal, Journal)
-            self._backlog.append(journal)
+            self._backlog.append((journal, message.log_ns))
         key = (envelope.topic.noun, envelope.owner)
         queues = self._queues.get(key)
         if queues is None:
@@ -143,7 +144,7 @@ class ReplayRunner:
             self._comparison.recorded(message)
         return True
 
-    def _follow(self, journal: Journal) -> None:
+    def _follow(self, journal: Journal, logged_ns: int) -> None:
         nodes = self._replayed_nodes
         for now_ns, kind, key, noun, owner, sequence, _ in read_entries(journal):
             node = nodes.get(key)
@@ -159,16 +160,18 @@ class ReplayRunner:
             if kind == Kind.START:
                 node.start(self._factory, journal.process, now_ns)
             elif kind == Kind.INPUT:
-                self._hand_over(node, noun, owner, sequence, now_ns)
+                self._hand_over(node, noun, owner, sequence, now_ns, logged_ns)
             elif kind == Kind.TICK:
                 self._report.ticks += 1
                 node.tick(now_ns)
             elif kind == Kind.STOP:
                 node.stop(now_ns)
 
-    def _hand_over(self, node: ReplayedNode, noun: str, owner: str, sequence: int, now_ns: int) -> None:
+    def _hand_over(
+        self, node: ReplayedNode, noun: str, owner: str, sequence: int, now_ns: int, logged_ns: int
+    ) -> None:
         while (found := node.find(noun, owner, sequence)) is None:
-            if self._log_ns > now_ns + LOOK_AHEAD_NS or not self._pull():
+            if self._log_ns > logged_ns + LOOK_AHEAD_NS or not self._pull():
                 name = f"{node.key} <- {noun}"
                 self._report.missing_inputs[name] = self._report.missing_inputs.get(name, 0) + 1
                 return

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -16,6 +17,8 @@ from groundstation.launch.running import RunningRig, find_running
 
 LOADING = "while True: pass"
 READY_S = 90.0
+KEPT = 30
+"""Lines that are shown where one does not come."""
 
 
 class NotInTimeError(Exception):
@@ -34,6 +37,7 @@ class Flying:
         self.process = process
         self._bench = bench
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._newest: deque[str] = deque(maxlen=KEPT)
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
@@ -59,7 +63,9 @@ class Flying:
             try:
                 line = self._lines.get(timeout=max(0.0, until_s - time.monotonic()))
             except queue.Empty:
-                raise NotInTimeError(f"no line with {pattern} for {sorted(waiting)}") from None
+                last = "\n".join(self._newest)
+                raise NotInTimeError(f"no line with {pattern} for {sorted(waiting)}:\n{last}") from None
+            self._newest.append(line)
             self._bench.say(line[:100])
             found = re.search(pattern, line)
             if found is not None:
