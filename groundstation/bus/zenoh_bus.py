@@ -28,7 +28,7 @@ ALIVE = "alive"
 RECORD = "record"
 PACED = "/paced"
 LEASE_MS = 10_000
-"""A process that is paused with all others for a few seconds keeps its links, and what is under way in them."""
+"""A process that is paused for a few seconds keeps its links, and what is under way in them."""
 SUBSCRIBERS_KNOWN_NS = 1_000_000_000
 """The hub reports subscribers within milliseconds of a publisher's declaration; on a busy machine, later."""
 

@@ -135,6 +135,10 @@ class Run:
                 found["laboratory"] = pid
         return found
 
+    def every_pid(self):
+        """Process numbers of launcher, children and theirs."""
+        return (self.process.pid, *descendants(self.process.pid))
+
     def end_in_order(self):
         """Ask for the end; its code is 0, or 1 where it says that a fault landed a vehicle."""
         code, _ = self.end()

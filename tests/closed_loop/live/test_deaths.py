@@ -39,6 +39,11 @@ def of(path, kind, vehicle):
         return [row.payload for row in recording.delivered([kind], [vehicle])]
 
 
+def replayed(path, rig):
+    with Recording(path) as recording:
+        return ReplayRunner(recording, _factory(parse_rig(recording.info.rig_toml, rig))).run()
+
+
 def longest_silence_s(payloads):
     stamps = [payload.stamp_ns for payload in payloads]
     return max(b - a for a, b in itertools.pairwise(stamps)) * 1e-9
@@ -169,9 +174,25 @@ def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
     assert "outside the part of the table" in refused.stdout
     run.wait_for("alpha", "flying", "armed")
     run.end_in_order()
-    with Recording(run.recording) as recording:
-        rig = parse_rig(recording.info.rig_toml, two_drawn)
-        report = ReplayRunner(recording, _factory(rig)).run()
+    report = replayed(run.recording, two_drawn)
     assert [(row.noun, row.owner, str(row.first)) for row in report.results if not row.agrees] == []
     assert not report.missing_inputs
     assert not report.refused
+
+
+def test_a_recording_of_a_rig_that_was_paused_whole_replays_bit_for_bit(launch, two_drawn):
+    run = launch(two_drawn)
+    run.wait_until_flying()
+    pids = run.every_pid()
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(3.0)  # Ctrl-Z and fg, of all processes this time
+    run.forget()
+    for pid in pids:
+        os.kill(pid, signal.SIGCONT)
+    run.wait_for("alpha: FAULT clock_jumped")
+    run.wait_for("alpha", "flying", "armed")
+    run.end_in_order()
+    report = replayed(run.recording, two_drawn)
+    assert [(row.noun, row.owner, str(row.first)) for row in report.results if not row.agrees] == []
+    assert not report.missing_inputs
