@@ -157,7 +157,6 @@ def test_a_launcher_that_was_paused_does_not_take_its_own_silence_for_that_of_ot
 def test_a_dead_laboratory_is_started_again_with_every_process(launch, two_drawn):
     run, old = fly_and(launch, two_drawn, "laboratory", signal.SIGKILL)
     run.wait_for("the laboratory was ended by SIGKILL: starting it again")
-    run.wait_for("resting")
     run.wait_until_flying()
     assert run.pids()["laboratory"] != old
     run.end_in_order()
