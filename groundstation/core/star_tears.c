@@ -11,10 +11,11 @@
 
 static const double EDGE_PX = 7.0;       /* spots so near to the edge may have been dropped as cut by it */
 static const double NEAR_TOLERANCES = 2.5; /* a light so near to a star's place is no other star's */
-static const double USUAL_NATS = 8.0, SPARSE_NATS = 12.0; /* at most; where most stars are missing */
+static const double USUAL_NATS = 8.0;
+static const double SPARSE_NATS = 12.0, SPARSE_RATIO = 0.8; /* of missing stars over good ones: a sky gone dark */
 static const double STREAK_RATIO = 0.02; /* residuals of streaks are worse by so much of their length */
 static const int NEWTON_STEPS = 4;
-enum { FEWEST_BESIDE_STEP = 3 };
+enum { FEWEST_BESIDE_STEP = 4 };
 
 /* The pixel that sees a place, by Newton's method on the table; far outside the picture it is only outside. */
 static void pixel_of(const Rays *rays, Point q, double *u_px, double *v_px)
@@ -60,6 +61,7 @@ static double end_nats(const Ends *ends, int64_t good)
 {
     const double seen = (double)good + 0.5, missing = (double)ends->missing[4] + 1.0, stray = (double)ends->stray[4] + 0.5;
     double best = 0.0;
+    const int64_t gone = ends->missing[5], foreign = ends->stray[5];
     for (int k = 0; k < 4; k++) {
         if (ends->missing[k] == 0 || ends->stray[k] == 0) {
             continue;
@@ -72,7 +74,7 @@ static double end_nats(const Ends *ends, int64_t good)
     }
     /* Where stars are missing and lights stray all over the picture, some are at its ends too. */
     const double usual = fmin((double)ends->missing[4], (double)ends->stray[4]) + 0.5 * (double)ends->stray[4];
-    return best - fmin(usual, USUAL_NATS) - (ends->missing[5] > good ? SPARSE_NATS : 0.0);
+    return best - fmin(usual, USUAL_NATS) - (foreign <= good ? SPARSE_NATS * fmax((double)gone / (double)good - SPARSE_RATIO, 0.0) : 0.0);
 }
 
 /* Sums over the residuals of one part of the picture. */
@@ -101,7 +103,7 @@ static double left_over(Part p)
 }
 
 /* Twice the residuals' root mean square, where two motions, one above and one below a row, leave `ratio` times less of
- * it than one does: no outlier among three stars or more does that. e is in the order of rows. */
+ * it than one does: no outlier among four stars or more does that. e is in the order of rows. */
 static double two_motions(const Point *q, const Point *e, int64_t n, double ratio)
 {
     Part above = {0}, below = {0};

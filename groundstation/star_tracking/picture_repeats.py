@@ -25,8 +25,8 @@ FULL_DN = 255
 FEWEST_PIXELS = 8
 """So many lit pixels do not have the same noise twice."""
 NOISY_SHARE = 0.25
-"""Of the pixels of a row that differ from their neighbours, from where it has its own noise: rows that a camera
-clips, or a JPEG smooths, may be equal."""
+"""Of the pixels of a row that differ from their neighbours, from where it has its own noise: rows that a
+camera clips, or a JPEG smooths, may be equal."""
 
 Bytes = NDArray[np.uint8]
 

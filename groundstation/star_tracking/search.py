@@ -120,9 +120,7 @@ class Search:
             residual_m=self._residual_m[:stars].copy(),
             evidence_nats=picture.evidence_nats,
         )
-        return Found(
-            fix, picture.best_nats, None, tear_nats=picture.tear_nats, tear_px=picture.tear_px
-        )
+        return Found(fix, picture.best_nats, None, tear_nats=picture.tear_nats, tear_px=picture.tear_px)
 
     def _make_room(self, spots: int) -> None:
         """Allocate buffers for pictures of so many spots."""

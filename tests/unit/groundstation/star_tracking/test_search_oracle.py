@@ -17,7 +17,6 @@ from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 pytestmark = pytest.mark.core
 
 
-
 def whole_tracker(catalogue, camera, settings=None):
     """The core's search alone: test_torn_pictures.py is about the check that follows it."""
     return StarTracker(catalogue, camera, replace(settings or TrackerSettings(), tear_nats=inf, tear_px=inf))
