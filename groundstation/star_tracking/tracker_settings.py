@@ -26,7 +26,7 @@ MIN_STREAK_SHARE = 0.4
 MAX_MISFIT_RATIO = 0.25
 SMEAR_ROUNDS = 6
 
-TEAR_SCATTERS = 4.0
+TEAR_SCATTERS = 6.0
 """A step between the residuals of two parts of a picture is so much larger than the scatter within them."""
 TEAR_RATIO = 3.0
 """Two motions, one above the other, leave so much less of the residuals than one does."""
