@@ -7,6 +7,7 @@ by more than one.
 
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
@@ -26,8 +27,13 @@ class CameraCounters:
     received: int
     skipped: int
     """Received but replaced by a newer picture before anybody read them."""
-    garbled: int
-    """Arrived broken."""
+    refused: Mapping[str, int]
+    """Arrived and were not passed on, by the reason: broken, of an unknown type, the last one again."""
+
+    @property
+    def garbled(self) -> int:
+        """Refused, whatever the reason."""
+        return sum(self.refused.values())
 
 
 class StarCamera:
@@ -77,7 +83,8 @@ class StarCamera:
         """Counts up to now."""
         with self._news:
             unread = self._newest is not None
-            return CameraCounters(self._received, self._received - self._read - unread, self._source.garbled)
+            skipped = self._received - self._read - unread
+            return CameraCounters(self._received, skipped, self._source.refusals.counts)
 
     def read(self, timeout_s: float | None = None) -> CameraFrame | None:
         """The newest picture that has not been read yet; waits for one.
@@ -100,7 +107,11 @@ class StarCamera:
                 now_s = time.monotonic()
                 silent_at_s = self._received_s + self._silence_s
                 if now_s >= silent_at_s:
-                    raise LinkLost(f"star camera {self.name} has sent no picture for {self._silence_s:g} s")
+                    refused = self._source.refusals.in_words()
+                    raise LinkLost(
+                        f"star camera {self.name} has sent no picture for {self._silence_s:g} s"
+                        + (f"; refused so far: {refused}" if refused else "")
+                    )
                 if give_up_s is not None and now_s >= give_up_s:
                     return None
                 self._news.wait((silent_at_s if give_up_s is None else min(silent_at_s, give_up_s)) - now_s)

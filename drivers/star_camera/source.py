@@ -4,28 +4,23 @@ A source blocks until its next picture is there. Nobody but `port.StarCamera` sh
 slow reader would see pictures that are seconds old.
 """
 
-import http.client
-import socket
 import threading
 import time
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Protocol
-from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import LinkLost, NotFound
-from drivers.star_camera.device_stamp import device_stamp_ns, offset_utc_ns
-from drivers.star_camera.multipart import PartParser, boundary_of
+from drivers.star_camera.device_stamp import SenderClock, offset_utc_ns
+from drivers.star_camera.http_stream import HttpStream
 from drivers.star_camera.picture import decode_picture, to_colour, to_mono
-
-_READ_BYTES = 1 << 16
+from drivers.star_camera.refusals import PictureRefused, Refusals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +37,8 @@ class PictureSource(Protocol):
     """Pictures one after the other."""
 
     name: str
-    garbled: int
-    """Pictures that arrived broken."""
+    refusals: Refusals
+    """Pictures that came and were not passed on."""
 
     def read(self) -> Picture:
         """Block until the next whole picture is there.
@@ -61,86 +56,71 @@ class PictureSource(Protocol):
 class HttpSource:
     """A multipart stream over HTTP: raw mono8 or bgr8, JPEG or PNG parts. No proxy, no redirection.
 
+    A picture with the number or the stamp of the one before is that one again: it is refused as frozen.
+
     Raises:
         NotFound: Nobody serves a multipart stream there.
     """
 
     def __init__(self, url: str, timeout_s: float, *, is_colour: bool = False) -> None:
         self.name = url
+        self.refusals = Refusals()
         self._is_colour = is_colour
-        self.garbled = 0
         self._timeout_s = timeout_s
         self._ready: deque[Picture] = deque()
-        self._reading = threading.Lock()
-        address = urlsplit(url)
-        path = (address.path or "/") + (f"?{address.query}" if address.query else "")
-        try:
-            self._connection = http.client.HTTPConnection(
-                address.hostname or "", address.port, timeout=timeout_s
-            )
-            self._connection.connect()
-            self._socket = self._connection.sock
-            self._is_of_this_host = ip_address(self._socket.getpeername()[0]).is_loopback
-            self._connection.request("GET", path, headers={"Accept": "multipart/x-mixed-replace"})
-            self._response = self._connection.getresponse()
-        except (OSError, ValueError, http.client.HTTPException) as error:
-            if hasattr(self, "_connection"):
-                self._connection.close()
-            raise NotFound(f"star camera {url} does not answer: {error or type(error).__name__}") from error
-        content_type = self._response.headers.get("Content-Type", "")
-        boundary = boundary_of(content_type)
-        if self._response.status != http.client.OK or boundary is None:
-            self.close()
-            raise NotFound(
-                f"star camera {url} serves no picture stream:"
-                f" status {self._response.status}, content type {content_type!r}"
-            )
-        self._parts = PartParser(boundary)
+        self._stream = HttpStream(url, timeout_s)
+        self._clock = SenderClock()
+        self._last = ("", "")
 
     def read(self) -> Picture:
-        """The next whole picture; pictures that cannot be decoded are counted and passed over."""
+        """The next whole picture; those that cannot be used are counted and passed over."""
         deadline_s = time.monotonic() + self._timeout_s
+        before = self.refusals.total
         while not self._ready:
             try:
-                with self._reading:
-                    chunk = self._response.read1(_READ_BYTES)
-            except (OSError, ValueError, http.client.HTTPException) as error:
-                raise LinkLost(f"star camera {self.name} is lost: {error or type(error).__name__}") from error
-            stamp_ns = time.monotonic_ns()
-            if not chunk:
-                raise LinkLost(f"star camera {self.name} ended its stream")
-            for part in self._parts.feed(chunk):
-                self._decode(part.headers, part.body, stamp_ns)
-            if not self._ready and time.monotonic() > deadline_s:
+                parts = self._stream.read(deadline_s)
+            except TimeoutError as error:
+                refused = self.refusals.in_words() if self.refusals.total > before else ""
                 raise LinkLost(
-                    f"star camera {self.name} sends bytes but no picture for {self._timeout_s:g} s"
-                )
+                    f"star camera {self.name} sends no picture for {self._timeout_s:g} s"
+                    + (f"; refused: {refused}" if refused else "")
+                ) from error
+            except OSError as error:
+                raise LinkLost(f"star camera {self.name} is lost: {error}") from error
+            stamp_ns = time.monotonic_ns()
+            for part in parts:
+                self._take(part.headers, part.body, stamp_ns)
+            if not parts and self._stream.has_ended and not self._ready:
+                raise LinkLost(f"star camera {self.name} ended its stream")
         return self._ready.popleft()
 
     def close(self) -> None:
         """Shut the socket down, which wakes a reader."""
-        with suppress(OSError):  # the server may have been faster
-            self._socket.shutdown(socket.SHUT_RDWR)
-        with self._reading:
-            self._response.close()
-            self._connection.close()
+        self._stream.close()
 
-    def _decode(self, headers: dict[str, str], body: bytes, stamp_ns: int) -> None:
-        sequence = headers.get("x-sequence", "")
+    def _take(self, headers: dict[str, str], body: bytes, arrival_ns: int) -> None:
         try:
+            self._refuse_repetition(headers.get("x-sequence", ""), headers.get("x-timestamp", ""))
             image = decode_picture(headers, body, is_colour=self._is_colour)
-        except ValueError:
-            self.garbled += 1
+        except PictureRefused as refused:
+            self.refusals.count(refused.kind)
             return
-        number = int(sequence) if sequence.isdecimal() else None
-        device_ns = _stamp_in(headers, stamp_ns) if self._is_of_this_host else None
-        self._ready.append(Picture(image, stamp_ns, number, device_ns))
+        sequence = headers.get("x-sequence", "")
+        number = int(sequence) if sequence.isdecimal() and len(sequence) < 19 else None
+        device_ns = None
+        if self._stream.is_of_this_host:
+            with suppress(ValueError):  # no header, or no number in it: the arrival has to do
+                stamp_s = float(headers.get("x-timestamp", ""))
+                device_ns = self._clock.stamp_ns(stamp_s, arrival_ns, offset_utc_ns())
+        self._ready.append(Picture(image, arrival_ns, number, device_ns))
 
-
-def _stamp_in(headers: dict[str, str], arrival_ns: int) -> int | None:
-    with suppress(ValueError):  # no header, or no number in it: the arrival has to do
-        return device_stamp_ns(float(headers.get("x-timestamp", "")), arrival_ns, offset_utc_ns())
-    return None
+    def _refuse_repetition(self, number: str, stamp: str) -> None:
+        last_number, last_stamp = self._last
+        self._last = (number, stamp)
+        if number and number == last_number:
+            raise PictureRefused("frozen: its X-Sequence repeats")
+        if "." in stamp and stamp == last_stamp:  # whole seconds are the same in several pictures
+            raise PictureRefused("frozen: its X-Timestamp repeats")
 
 
 class VideoSource:
@@ -153,7 +133,9 @@ class VideoSource:
     def __init__(self, address: int | str, timeout_s: float, *, is_colour: bool = False) -> None:
         self._convert = to_colour if is_colour else to_mono
         self.name = f"video {address}"
-        self.garbled = 0
+        self.refusals = Refusals()
+        self._clock = SenderClock()
+        self._last_ns: int | None = None
         self._reading = threading.Lock()
         limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, round(timeout_s * 1e3)]
         limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, round(timeout_s * 1e3)]
@@ -174,11 +156,16 @@ class VideoSource:
                 device_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) * 1e-3
             if not is_there:
                 raise LinkLost(f"star camera {self.name} gives no more pictures")
-            device_ns = device_stamp_ns(device_s, stamp_ns, offset_utc_ns()) if device_s > 0.0 else None
+            device_ns = None
+            if device_s > 0.0:
+                device_ns = self._clock.stamp_ns(device_s, stamp_ns, offset_utc_ns())
+            last_ns, self._last_ns = self._last_ns, device_ns
             try:
+                if device_ns is not None and device_ns == last_ns:
+                    raise PictureRefused("frozen: its driver's stamp repeats")
                 return Picture(self._convert(image), stamp_ns, None, device_ns)
-            except ValueError:
-                self.garbled += 1
+            except PictureRefused as refused:
+                self.refusals.count(refused.kind)
 
     def close(self) -> None:
         """Release the device, once a reader has its picture."""
@@ -196,7 +183,7 @@ class FolderSource:
     def __init__(self, folder: Path, rate_hz: float, *, is_colour: bool = False) -> None:
         self.name = str(folder)
         self._is_colour = is_colour
-        self.garbled = 0
+        self.refusals = Refusals()
         self._closing = threading.Event()
         self._files = sorted(folder.glob("*.png"))
         if not self._files:
@@ -216,8 +203,8 @@ class FolderSource:
             try:
                 body = self._files[number].read_bytes()
                 image = decode_picture({"content-type": "image/png"}, body, is_colour=self._is_colour)
-            except ValueError:
-                self.garbled += 1
+            except PictureRefused as refused:
+                self.refusals.count(refused.kind)
                 continue
             except OSError as error:
                 raise LinkLost(f"star camera folder {self.name} is lost: {error}") from error

@@ -107,6 +107,7 @@ typedef struct {
     double prior_freedom, clip_sigmas;
     double min_streak_px, min_streak_share, max_misfit_ratio;
     int64_t min_streaks, smear_rounds;
+    double tear_scatters, tear_ratio;
 } SearchSettings;
 
 /* One picture in, one answer out. */
@@ -126,6 +127,7 @@ typedef struct {
     double best_nats, guess[3];       /* of a refused picture */
     int32_t *spot_index, *star_index; /* (stars,), room for every spot */
     Point *residual_m;
+    double tear_nats, tear_px; /* of gs_star_tears: for an end with other stars; of the largest step in the residuals */
 } StarPicture;
 
 int64_t gs_star_doubles(int64_t spots);
@@ -133,6 +135,9 @@ int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *set
 
 /* Search one picture. */
 void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture);
+
+/* Look whether the picture, in which gs_star_solve has just found a fix, shows its stars at two places. */
+void gs_star_tears(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture);
 
 /* ---- The filter's states and their order: fusion/error_state.py ---------------------------------------------------
  *

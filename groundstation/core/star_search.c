@@ -12,7 +12,7 @@ int64_t gs_star_integers(int64_t spots, int64_t stars, const SearchSettings *set
     return (2 + settings->neighbours) * spots + CELL * settings->candidates + stars;
 }
 
-static SkySearch begin(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
+SkySearch begin_search(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
 {
     const int64_t n = picture->spots;
     SkySearch found = {.sky = sky, .rays = rays, .settings = settings, .picture = picture};
@@ -161,18 +161,36 @@ static int lost_in_space(SkySearch *s)
     return 0;
 }
 
+/* Put what moved during the exposure where it was at its middle: by the streaks, or by the motion if it is known. */
+static void straighten(SkySearch *s)
+{
+    StarPicture *picture = s->picture;
+    Smear smear;
+    look_up_rays(s->rays, picture->spots, picture->u_px, picture->v_px, s->q, s->jacobian);
+    if ((!picture->has_motion || s->settings->exposure_s == 0.0) &&
+        smear_from_streaks(s->settings, picture->spots, s->q, picture->streak_px, s->jacobian, s->free, &smear)) {
+        unbend(picture->spots, s->q, smear, s->q);
+    }
+}
+
+/* Where the spots were at the middle of the exposure, under a turn: into q_middle. */
+void see_places(SkySearch *s, Point turn)
+{
+    straighten(s);
+    if (s->picture->has_motion) {
+        to_middle(s->picture, s->settings, s->rays->picture_rows, s->q, turn, s->q_middle);
+    } else {
+        memcpy(s->q_middle, s->q, (size_t)s->picture->spots * sizeof *s->q);
+    }
+}
+
 /* Solve one picture with enough spots; the answer is in the picture. */
 void gs_star_solve(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture)
 {
-    SkySearch s = begin(sky, rays, settings, picture);
+    SkySearch s = begin_search(sky, rays, settings, picture);
     picture->is_fix = picture->is_ambiguous = 0;
     picture->best_nats = -INFINITY;
-    look_up_rays(rays, picture->spots, picture->u_px, picture->v_px, s.q, s.jacobian);
-    Smear smear;
-    if ((!picture->has_motion || settings->exposure_s == 0.0) &&
-        smear_from_streaks(settings, picture->spots, s.q, picture->streak_px, s.jacobian, s.free, &smear)) {
-        unbend(picture->spots, s.q, smear, s.q);
-    }
+    straighten(&s);
     if (picture->has_prior) {
         if (track(&s) || picture->spots < settings->min_stars) {
             return;

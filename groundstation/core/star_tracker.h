@@ -87,6 +87,9 @@ typedef struct {
     int64_t look_ups_left, cells;
 } SkySearch;
 
+SkySearch begin_search(const Sky *sky, const Rays *rays, const SearchSettings *settings, StarPicture *picture);
+void see_places(SkySearch *s, Point turn);
+
 int settle(SkySearch *s, Candidate *candidate, double gate_m, int has_prior, double *nats);
 
 #endif

@@ -24,6 +24,7 @@ class Refusal(StrEnum):
     BLURRED = "too blurred"
     NO_CONSENSUS = "no consensus"
     NOT_OUR_CEILING = "not our ceiling"
+    TORN = "torn picture"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Pictures that a camera delivers twice: frozen, in a loop, or torn between two pictures.
+"""Pictures that a camera delivers twice: frozen, in a loop, torn between two pictures, or with rows twice.
 
 Noise never repeats: two pictures of one scene differ in nearly every row that holds light. What is equal byte
 for byte was not taken twice, it was delivered twice, and a fix made of it would carry a false stamp.
@@ -6,6 +6,7 @@ for byte was not taken twice, it was delivered twice, and a fix made of it would
 
 from __future__ import annotations
 
+import functools
 import itertools
 import zlib
 from collections.abc import Iterator
@@ -23,6 +24,9 @@ FULL_DN = 255
 """A pixel that is always full, a hot one, proves nothing."""
 FEWEST_PIXELS = 8
 """So many lit pixels do not have the same noise twice."""
+NOISY_SHARE = 0.25
+"""Of the pixels of a row that differ from their neighbours, from where it has its own noise: rows that a
+camera clips, or a JPEG smooths, may be equal."""
 
 Bytes = NDArray[np.uint8]
 
@@ -59,7 +63,8 @@ class PictureRepeats:
         if lit:
             first, last = edges[lit[0]], edges[lit[-1] + 1] - 1
             return f"torn picture: of rows {first} to {last} some are those of a picture before"
-        return ""
+        twice = _row_twice(picture)
+        return f"torn picture: row {twice[1]} is row {twice[0]} again" if twice else ""
 
     def _remember(self, sums: NDArray[np.uint32], stamp_ns: int) -> None:
         if len(self._stamps_ns) < REMEMBERED:
@@ -79,3 +84,25 @@ def _lit(picture: Bytes, bands: list[Bytes], chosen: list[int]) -> Iterator[int]
         above = (bands[index] > background_dn + LIGHT_DN) & (bands[index] < FULL_DN)
         if np.count_nonzero(above) >= FEWEST_PIXELS:
             yield index
+
+
+def _row_twice(picture: Bytes) -> tuple[int, int] | None:
+    """Two rows with noise that are equal, byte for byte."""
+    rows = picture.reshape(len(picture), -1)
+    words = rows.shape[1] // 8
+    if words == 0:
+        return None
+    packed = np.ascontiguousarray(rows[:, : 8 * words]).view(np.uint64)
+    sums = packed @ _odd_numbers(words)  # modulo 2^64: what differs gets the same sum by chance once in 2^64
+    order = np.argsort(sums, kind="stable")
+    for index in np.flatnonzero(np.diff(sums[order]) == 0).tolist():
+        first, second = sorted((int(order[index]), int(order[index + 1])))
+        is_noisy = np.count_nonzero(np.diff(rows[first].astype(np.int16))) > NOISY_SHARE * rows.shape[1]
+        if is_noisy and np.array_equal(rows[first], rows[second]):
+            return first, second
+    return None
+
+
+@functools.cache
+def _odd_numbers(count: int) -> NDArray[np.uint64]:
+    return np.random.default_rng(1).integers(0, 2**63, count, dtype=np.uint64) * 2 + 1

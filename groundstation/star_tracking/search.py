@@ -36,12 +36,16 @@ class Found:
         best_nats: Best log likelihood over chance of any pose that was refined.
         best_guess: That pose.
         is_ambiguous: There was a fix, but another place of the catalogue explains the picture as well.
+        tear_nats: With a fix: log likelihood over chance that one end of the picture shows other stars.
+        tear_px: With a fix: the largest step between the residuals of two parts of the picture.
     """
 
     fix: PictureFix | None
     best_nats: float
     best_guess: PoseGuess | None
     is_ambiguous: bool = False
+    tear_nats: float = 0.0
+    tear_px: float = 0.0
 
 
 class Search:
@@ -102,6 +106,7 @@ class Search:
         if not picture.is_fix:
             guess = PoseGuess(*picture.guess) if math.isfinite(picture.best_nats) else None
             return Found(None, picture.best_nats, guess, bool(picture.is_ambiguous))
+        self._lib.gs_star_tears(self._sky, self._rays, self._settings, picture)
         stars = picture.stars
         fix = PictureFix(
             x_m=picture.x_m,
@@ -115,7 +120,7 @@ class Search:
             residual_m=self._residual_m[:stars].copy(),
             evidence_nats=picture.evidence_nats,
         )
-        return Found(fix, picture.best_nats, None)
+        return Found(fix, picture.best_nats, None, tear_nats=picture.tear_nats, tear_px=picture.tear_px)
 
     def _make_room(self, spots: int) -> None:
         """Allocate buffers for pictures of so many spots."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior, Refusal
+from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PoseGuess, PosePrior, Refusal
 from groundstation.star_tracking.rays import CeilingRays
 from groundstation.star_tracking.search import Found, Search
 from groundstation.star_tracking.sky_index import SkyIndex
@@ -69,7 +69,22 @@ class StarTracker:
         if n < needed:
             return self._too_few(spots, needed, motion)
         found = self._search.find(spots, prior, motion)
-        return found.fix or self._refusal(spots, found)
+        if found.fix is None:
+            return self._refusal(spots, found)
+        return self._torn(spots, found) or found.fix
+
+    def _torn(self, spots: Spots, found: Found) -> NoFix | None:
+        """Refuse a fix of a picture that shows its stars at two places: one of them is wrong."""
+        assert found.fix is not None
+        if found.tear_nats >= self.settings.tear_nats:
+            detail = "At one end of the picture there are lights, and none where its stars should be."
+        elif found.tear_px >= self.settings.tear_px:
+            detail = f"Two parts of the picture are {found.tear_px:.2f} px apart"
+            detail += "." if self.settings.readout_s else "; or its rows are read out later, see readout_s."
+        else:
+            return None
+        guess = PoseGuess(found.fix.x_m, found.fix.y_m, found.fix.heading_rad)
+        return NoFix(Refusal.TORN, detail, len(spots), found.best_nats, guess)
 
     def _too_few(self, spots: Spots, needed: int, motion: BodyMotion | None) -> NoFix:
         """Say why there are not even enough spots to begin with: no light, or light drawn out too thin."""

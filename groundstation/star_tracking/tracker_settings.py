@@ -26,6 +26,11 @@ MIN_STREAK_SHARE = 0.4
 MAX_MISFIT_RATIO = 0.25
 SMEAR_ROUNDS = 6
 
+TEAR_SCATTERS = 6.0
+"""A step between the residuals of two parts of a picture is so much larger than the scatter within them."""
+TEAR_RATIO = 3.0
+"""Two motions, one above the other, leave so much less of the residuals than one does."""
+
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
@@ -45,6 +50,8 @@ class TrackerSettings:
         pair_spots_total: With more spots than this pairs are not tried.
         look_ups: Cap on tested spot positions per picture.
         candidates: Cap on poses refined per picture.
+        tear_nats: Log likelihood over chance from which an end of the picture shows other stars: it is torn.
+        tear_px: Step between the residuals of two parts of the picture from which it is torn.
         exposure_s: Of the camera; with a known motion it straightens streaks. 0: streaks tell themselves.
         readout_s: Time from the first to the last row of a rolling shutter; 0 for a global one.
     """
@@ -62,5 +69,7 @@ class TrackerSettings:
     pair_spots_total: int = 20
     look_ups: int = 80_000
     candidates: int = 100
+    tear_nats: float = 4.5
+    tear_px: float = 0.2
     exposure_s: float = 0.0
     readout_s: float = 0.0

@@ -1,4 +1,6 @@
 import itertools
+import re
+import tracemalloc
 
 import cv2
 import numpy as np
@@ -10,6 +12,7 @@ from drivers.star_camera.camera_frame import CameraFrame
 from drivers.star_camera.exposure import ExposureDelay
 from drivers.star_camera.multipart import PartParser, boundary_of
 from drivers.star_camera.picture import decode_picture, to_mono
+from drivers.star_camera.refusals import PictureRefused
 
 BOUNDARY = b"--frame"
 BODIES = st.binary(max_size=60).filter(lambda body: BOUNDARY not in body)
@@ -56,11 +59,104 @@ def test_a_part_cut_short_costs_only_itself():
 
 
 @pytest.mark.parametrize("length", [b"nonsense", b"-5", b"99999999999"])
-def test_a_senseless_length_costs_only_its_part(length):
+def test_a_senseless_length_costs_nothing(length):
     parser = PartParser(BOUNDARY)
     bad = b"--frame\r\nContent-Length: " + length + b"\r\n\r\nbody\r\n"
     bodies = [p.body for chunk in (bad, part(b"good"), part(b"next")) for p in parser.feed(chunk)]
-    assert bodies == [b"good", b"next"]
+    assert bodies == [b"body", b"good", b"next"]
+
+
+@pytest.mark.parametrize(
+    "wrong", [lambda n: n - 1, lambda n: n // 2, lambda n: n + 1, lambda n: 3 * n, lambda n: 31_000_000]
+)
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_a_wrong_length_costs_no_picture(wrong, kind):
+    bodies = [cv2.imencode(kind, np.roll(STARS, shift, 1))[1].tobytes() for shift in range(4)]
+    stream = b"".join(
+        b"--frame\r\nContent-Length: %d\r\n\r\n%s\r\n" % (wrong(len(body)), body) for body in bodies
+    )
+    parser = PartParser(BOUNDARY)
+    assert [p.body for chunk in cut(stream, range(0, 9000, 100)) for p in parser.feed(chunk)] == bodies
+
+
+@pytest.mark.parametrize("wrong", [7, 400, 1_000_000])
+def test_a_wrong_length_of_what_does_not_mark_its_end_costs_one_part(wrong):
+    bad = b"--frame\r\nContent-Length: %d\r\n\r\n" % wrong + b"x" * 100 + b"\r\n"
+    parser = PartParser(BOUNDARY)
+    bodies = [p.body for chunk in (bad, part(b"good"), part(b"next")) for p in parser.feed(chunk)]
+    assert bodies[-2:] == [b"good", b"next"]
+
+
+@pytest.mark.parametrize("head", [b"", b"Content-Length: 30000000\r\n", b"Content-Type: image/jpeg\r\n"])
+def test_a_body_without_end_takes_a_bounded_memory(head):
+    parser, chunk = PartParser(BOUNDARY), b"x" * (1 << 20)
+    start = b"\xff\xd8\xff\xe0" if b"jpeg" in head else b""
+    list(parser.feed(b"--frame\r\n" + head + b"\r\n" + start))
+    tracemalloc.start()
+    try:
+        for _ in range(150):
+            list(parser.feed(chunk))
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 80e6
+    assert [p.body for p in parser.feed(b"\r\n" + part(b"good"))][-1:] == [b"good"]
+
+
+def test_a_stream_that_ends_gives_its_last_part():
+    parser = PartParser(BOUNDARY)
+    assert not list(parser.feed(b"--frame\r\n\r\nunmarked"))
+    assert [p.body for p in parser.finish()] == [b"unmarked"]
+    assert not list(parser.finish())
+
+
+@given(st.lists(st.integers(0, 63), min_size=1, max_size=4), st.lists(st.integers(0, 30_000), max_size=12))
+def test_pictures_end_by_themselves_whatever_the_chunking(shifts, places):
+    bodies = [jpeg(np.roll(STARS, shift, 1)) for shift in shifts]
+    stream = b"".join(b"--frame\n\n" + body + b"\n" for body in bodies)
+    parser = PartParser(None)
+    assert [p.body for chunk in cut(stream, places) for p in parser.feed(chunk)] == bodies
+
+
+def test_the_end_of_a_thumbnail_is_not_that_of_its_picture():
+    whole = jpeg(STARS)
+    app1 = b"Exif\0\0" + jpeg(STARS[:16, :16])
+    body = whole[:2] + b"\xff\xe1" + (len(app1) + 2).to_bytes(2) + app1 + whole[2:]
+    assert [p.body for p in PartParser(BOUNDARY).feed(b"--frame\r\n\r\n" + body)] == [body]
+
+
+def damaged(rng, whole, kind):
+    """A JPEG as a bad link leaves it; its beginning, where the tables are, and its end are whole."""
+    first, n = whole.index(b"\xff\xda") + 20, len(whole)
+    at = int(rng.integers(first, n - 200))
+    count = int(rng.integers(2, 150))
+    if kind == "lost":
+        return whole[:at] + whole[at + count :]
+    if kind == "zeros":
+        return whole[:at] + bytes(count) + whole[at + count :]
+    if kind == "doubled":
+        return whole[: at + count] + whole[at:]
+    restarts = [m.start() for m in re.finditer(rb"\xff[\xd0-\xd7]", whole)]
+    i = int(rng.integers(len(restarts) - 4))
+    return whole[: restarts[i]] + whole[restarts[i + int(rng.integers(1, 4))] :]  # whole intervals lost
+
+
+@pytest.mark.parametrize("kind", ["lost", "zeros", "doubled", "intervals"])
+def test_a_jpeg_that_its_decoder_warns_of_is_refused(kind):
+    rng = np.random.default_rng(1)
+    image = rng.normal(10.0, 2.0, (240, 320)).clip(0, 255).astype(np.uint8)
+    restarts = [cv2.IMWRITE_JPEG_RST_INTERVAL, 10] if kind == "intervals" else []
+    whole = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90, *restarts])[1].tobytes()
+    assert np.array_equal(
+        decode_picture({}, whole), cv2.imdecode(np.frombuffer(whole, np.uint8), cv2.IMREAD_GRAYSCALE)
+    )
+    refused = 0
+    for _ in range(200):
+        try:
+            decode_picture({}, damaged(rng, whole, kind))
+        except PictureRefused as refusal:
+            refused += refusal.kind == "a JPEG is damaged"
+    assert refused >= 195  # the rest are damages that leave as many blocks as there were
 
 
 def test_headers_without_end_are_given_up():
@@ -109,7 +205,7 @@ def test_a_truncated_jpeg_is_refused(keep):
 
 
 def test_a_jpeg_of_nothing_is_refused():
-    with pytest.raises(ValueError, match="no picture"):
+    with pytest.raises(ValueError, match="damaged"):
         decode_picture({"content-type": "image/jpeg"}, b"\xff\xd8" + bytes(50) + b"\xff\xd9")
 
 

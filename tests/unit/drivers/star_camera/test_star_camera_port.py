@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import LinkLost, NotFound
-from drivers.star_camera.device_stamp import device_stamp_ns
+from drivers.star_camera.device_stamp import SenderClock
 from drivers.star_camera.port import StarCamera
+from drivers.star_camera.refusals import Refusals
 from drivers.star_camera.source import FolderSource, Picture, VideoSource
 
 PATIENCE_S = 20.0  # only a failing test waits so long
@@ -81,7 +82,7 @@ class Hand:
     """A source that a test feeds picture by picture."""
 
     def __init__(self):
-        self.name, self.garbled, self.is_closed = "by hand", 0, False
+        self.name, self.refusals, self.is_closed = "by hand", Refusals(), False
         self._given, self._asked = threading.Semaphore(0), threading.Semaphore(0)
         self._next, self.age_ns = [], 0
 
@@ -155,21 +156,35 @@ def test_without_a_believable_stamp_the_arrival_counts(header):
 
 
 @given(
-    age_ns=st.integers(-(10**10), 10**10),
-    arrival_ns=st.integers(10**12, 10**15),
+    age_ns=st.integers(-(10**10), 10**14),
+    arrival_ns=st.integers(10**14, 10**15),
     offset_ns=st.integers(10**18, 2 * 10**18),
     is_utc=st.booleans(),
 )
-def test_a_stamp_is_believed_on_either_clock_if_it_lies_shortly_before_the_arrival(
+def test_a_stamp_is_believed_on_either_clock_while_no_other_clock_could_have_made_it(
     age_ns, arrival_ns, offset_ns, is_utc
 ):
     reported_ns = arrival_ns - age_ns + offset_ns * is_utc
-    found_ns = device_stamp_ns(reported_ns * 1e-9, arrival_ns, offset_ns)
+    found_ns = SenderClock().stamp_ns(reported_ns * 1e-9, arrival_ns, offset_ns)
     blur_ns = 1000  # of UTC seconds in a float
-    if blur_ns < age_ns < 2_000_000_000 - blur_ns:
+    oldest_ns = (86_400 if is_utc else 60) * 1_000_000_000
+    if blur_ns < age_ns < oldest_ns - blur_ns:
         assert abs(found_ns - (arrival_ns - age_ns)) <= blur_ns
-    elif not -blur_ns <= age_ns <= 2_000_000_000 + blur_ns:
+    elif not -blur_ns <= age_ns <= oldest_ns + blur_ns:
         assert found_ns is None
+
+
+@pytest.mark.parametrize("is_utc", [False, True])
+@pytest.mark.parametrize("age_s", [0.5, 3.0, 61.0, 4_000.0, 90_000.0])
+def test_once_the_clock_is_known_an_old_stamp_stays_old(is_utc, age_s):
+    clock, now_ns, offset_ns = SenderClock(), 10**14, 1_700_000_000 * 10**9
+    shift_s = offset_ns * 1e-9 * is_utc
+    assert clock.stamp_ns(now_ns * 1e-9 - 0.1 + shift_s, now_ns, offset_ns) == pytest.approx(
+        now_ns - 10**8, abs=1000
+    )
+    found_ns = clock.stamp_ns(now_ns * 1e-9 - age_s + shift_s, now_ns, offset_ns)
+    assert (now_ns - found_ns) * 1e-9 == pytest.approx(age_s, abs=1e-6)
+    assert clock.stamp_ns(now_ns * 1e-9 + 5.0 + shift_s, now_ns, offset_ns) is None
 
 
 def test_a_silent_source_is_a_lost_link():
@@ -242,6 +257,148 @@ def test_jpeg_over_http_works_and_a_truncated_one_is_counted():
         assert camera.counters.garbled == 1
 
 
+def numbered(value, number="", stamp=""):
+    """A raw part with the headers that are not empty."""
+    headers = [f"X-Sequence: {number}"] * bool(number) + [f"X-Timestamp: {stamp}"] * bool(stamp)
+    head = "\r\n".join(
+        ["--frame", "Content-Type: application/x-mono8", "X-Width: 32", "X-Height: 24", *headers]
+    )
+    return head.encode() + b"\r\n\r\n" + picture(value).tobytes() + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    ("same", "reason"),
+    [
+        ({"number": "41"}, "X-Sequence"),
+        ({"number": "41", "stamp": "5183.204517"}, "X-Sequence"),
+        ({"stamp": "5183.204517"}, "X-Timestamp"),
+        ({"stamp": "1764374400.125"}, "X-Timestamp"),
+    ],
+)
+def test_a_picture_with_the_number_or_stamp_of_the_last_one_is_that_one_and_the_camera_frozen(same, reason):
+    first, again, done = threading.Event(), threading.Event(), threading.Event()
+    script = Script(numbered(7, **same), first, numbered(8, **same), numbered(9, **same), again, done)
+    with serve(script) as url, StarCamera.open(url, silence_s=0.3) as camera:
+        assert camera.read(PATIENCE_S).image[0, 0] == 7
+        first.set()
+        again.set()
+        with pytest.raises(LinkLost, match=f"2 x frozen: its {reason} repeats"):
+            camera.read(PATIENCE_S)
+        assert camera.counters.received == 1
+
+
+@pytest.mark.parametrize("stamps", [("5183", "5183"), ("", ""), ("5183.1", "5183.2")])
+def test_a_number_that_goes_on_is_another_picture(stamps):
+    on, done = threading.Event(), threading.Event()
+    script = Script(numbered(7, "41", stamps[0]), on, numbered(8, "42", stamps[1]), done)
+    with serve(script) as url, StarCamera.open(url) as camera:
+        assert camera.read(PATIENCE_S).sequence == 41
+        on.set()
+        assert camera.read(PATIENCE_S).sequence == 42
+        done.set()
+
+
+@pytest.mark.parametrize("clock_s", [time.monotonic, time.time])
+@pytest.mark.parametrize("age_s", [3.0, 25.0])
+def test_a_picture_that_was_old_on_arrival_stays_old(clock_s, age_s):
+    done = threading.Event()
+    part = numbered(7, "1", f"{clock_s() - age_s:.6f}")
+    with serve(Script(part, done)) as url, StarCamera.open(url) as camera:
+        frame = camera.read(PATIENCE_S)
+        assert frame.stamp_arrival_ns - frame.stamp_ns >= (age_s - 0.01) * 1e9
+        done.set()
+
+
+def stars_jpeg(value):
+    stars = picture(0)
+    stars[10, 12] = value
+    return cv2.imencode(".jpg", stars)[1].tobytes()
+
+
+@pytest.mark.parametrize("kind", ["jpeg", "png", "raw"])
+def test_without_a_length_each_picture_is_given_when_it_has_come_and_the_last_too(kind):
+    head = b"--frame\r\n"
+    bodies = [stars_jpeg(200), stars_jpeg(100)]
+    if kind == "png":
+        bodies = [cv2.imencode(".png", picture(value))[1].tobytes() for value in (200, 100)]
+    if kind == "raw":
+        head += b"Content-Type: application/x-mono8\r\nX-Width: 32\r\nX-Height: 24\r\n"
+        bodies = [picture(value).tobytes() for value in (200, 100)]
+    on, done = threading.Event(), threading.Event()
+    script = Script(head + b"\r\n" + bodies[0], on, b"\r\n" + head + b"\r\n" + bodies[1], done)
+    with serve(script) as url, StarCamera.open(url) as camera:  # nothing follows: only their own ends tell
+        assert camera.read(PATIENCE_S).image.max() > 150
+        on.set()
+        assert 60 < camera.read(PATIENCE_S).image.max() < 150
+        done.set()
+
+
+@pytest.mark.parametrize(
+    "answer_type",
+    [
+        "multipart/x-mixed-replace; boundary=frame",
+        "multipart/x-mixed-replace;boundary=--frame",
+        'multipart/x-mixed-replace; boundary="frame"',
+        "multipart/x-mixed-replace ; boundary = frame",
+        "Multipart/X-Mixed-Replace; charset=utf-8; Boundary=frame",
+        "multipart/x-mixed-replace",
+        "application/octet-stream",
+        "",
+    ],
+)
+@pytest.mark.parametrize("line_end", [b"\r\n", b"\n"])
+@pytest.mark.parametrize(
+    "part_type", ["image/jpeg", "image/jpg", "image/pjpeg", "application/octet-stream", "IMAGE/JPEG; q=1", ""]
+)
+def test_a_stream_is_taken_by_its_first_bytes_however_it_is_called(answer_type, line_end, part_type):
+    lines = (
+        [b"--frame"]
+        + [b"Content-Type: " + part_type.encode()] * bool(part_type)
+        + [b"", stars_jpeg(200), b""]
+    )
+    done = threading.Event()
+    with (
+        serve(Script(line_end.join(lines), done, content_type=answer_type)) as url,
+        StarCamera.open(url) as camera,
+    ):
+        image = camera.read(PATIENCE_S).image
+        assert np.unravel_index(image.argmax(), image.shape) == (10, 12)
+        done.set()
+
+
+def test_what_is_no_picture_is_counted_with_its_type():
+    part = b"--frame\r\nContent-Type: text/plain\r\nContent-Length: 5\r\n\r\nhello\r\n"
+    done = threading.Event()
+    with serve(Script(part * 3, done)) as url, StarCamera.open(url, silence_s=0.2) as camera:
+        with pytest.raises(LinkLost, match=r"3 x neither JPEG, PNG nor raw \(content type 'text/plain'\)"):
+            camera.read(PATIENCE_S)
+        done.set()
+
+
+@pytest.mark.parametrize("head", [b"HTTP/1.0 200 OK\r\nContent-Type: ", b"HTTP/1.0 "])
+def test_an_answer_that_trickles_is_not_waited_for(head):
+    """One byte at a time never lets a socket time out; the answer as a whole must."""
+    over = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def trickle():
+            link, _ = server.accept()
+            with link:
+                for byte in head + b"x" * 100_000:
+                    if over.wait(0.005):
+                        return
+                    link.send(bytes([byte]))
+
+        thread = threading.Thread(target=trickle)
+        thread.start()
+        try:
+            with pytest.raises(NotFound, match="does not answer: timed out"):
+                StarCamera.open(f"http://127.0.0.1:{server.getsockname()[1]}/", silence_s=0.2)
+        finally:
+            over.set()
+            thread.join()
+
+
 def test_garbage_between_pictures_is_survived():
     done = threading.Event()
     noise = np.random.default_rng(3).integers(0, 256, 5000, np.uint8).tobytes()
@@ -306,7 +463,7 @@ def test_a_folder_plays_its_files_in_order_and_ends(tmp_path):
     (tmp_path / "00002b.png").write_bytes(b"no picture")
     source = FolderSource(tmp_path, rate_hz=10_000.0)
     assert [source.read().image[0, 0] for _ in range(3)] == [1, 2, 3]
-    assert source.garbled == 1
+    assert source.refusals.total == 1
     with pytest.raises(LinkLost, match="no more pictures"):
         source.read()
 

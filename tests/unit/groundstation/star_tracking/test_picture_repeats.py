@@ -2,6 +2,7 @@
 
 import time
 
+import cv2
 import numpy as np
 import pytest
 
@@ -79,6 +80,28 @@ def test_rows_without_light_and_full_pixels_may_be_equal():
     first[300:], second[300:] = 0, 0
     first[400:404, 40:48] = second[400:404, 40:48] = 255
     assert complaints([first, second]) == ["", ""]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 40])
+def test_rows_that_come_twice_are_named(count):
+    (picture,) = pictures(1)
+    twice = np.vstack((picture[: 100 + count], picture[100:]))[:ROWS]
+    (found,) = complaints([twice])
+    assert found.startswith("torn picture: row ")
+    assert found.endswith(" again")
+    over = picture.copy()
+    over[300 : 300 + count] = picture[20 : 20 + count]
+    (found,) = complaints([over])
+    assert found.startswith("torn picture: row ")
+
+
+@pytest.mark.parametrize("quality", [20, 50, 80, 95])
+@pytest.mark.parametrize("is_clipped", [False, True])
+def test_rows_that_a_jpeg_or_a_clipping_camera_makes_equal_are_no_repetition(quality, is_clipped):
+    for picture in pictures(6, is_clipped=is_clipped):
+        data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        assert complaints([picture]) == [""]
+        assert complaints([np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE))]) == [""]
 
 
 def test_a_camera_that_thaws_is_believed_again_at_once():

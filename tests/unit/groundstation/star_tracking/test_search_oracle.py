@@ -1,6 +1,7 @@
 """The search against its oracle in NumPy: the same stars, the same verdict, the same pose."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -15,7 +16,13 @@ from groundstation.star_tracking.tracker import StarTracker, TrackerSettings
 
 pytestmark = pytest.mark.core
 
-BOTH = (StarTracker, oracle_tracker)
+
+def whole_tracker(catalogue, camera, settings=None):
+    """The core's search alone: test_torn_pictures.py is about the check that follows it."""
+    return StarTracker(catalogue, camera, replace(settings or TrackerSettings(), tear_nats=inf, tear_px=inf))
+
+
+BOTH = (whole_tracker, oracle_tracker)
 
 
 @pytest.fixture(scope="module")
