@@ -7,6 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.data_sets.stamp_words import (
+    complaint_about_bunches,
+    complaint_about_fixes,
+    complaint_about_rate,
+    complaint_about_start,
+    complaint_about_units,
+    notes_of,
+)
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.number_tables import load_table
@@ -41,16 +49,28 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
         raise FileError(f"{folder}: is no folder with imu.csv, stars.csv and meta.json.")
     known = read_known(folder / "meta.json")
     # what is no number is refused packet by packet, with a reason
-    imu = load_table(folder / "imu.csv", IMU_COLUMNS, is_finite=False).numbers
+    path = folder / "imu.csv"
+    table = load_table(path, IMU_COLUMNS, is_finite=False)
+    imu, noise = table.numbers, noise_of(known)
+    period_s = noise.packet_period_s
+    _refuse(path, complaint_about_units(imu[:, 0], period_s) or complaint_about_bunches(imu, period_s))
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
-    # a stamp that is no number sorts to the end, where it is refused with a reason
-    stars = stars[np.argsort(stars[:, 1], kind="stable")]
-    noise = noise_of(known)
     variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
     covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
-    return FlightData(imu, stars, covariance, known["run_start_s"], noise)
+    given = FlightData(imu, stars, covariance, known["run_start_s"], noise)
+    data = given.screened(lambda found: notes_of(found, imu[:, 0], table.lines.tolist(), path.name))
+    stamp_s = data.imu[:, 0]
+    _refuse(path, complaint_about_start(stamp_s, known["duration_s"]))
+    _refuse(path, complaint_about_rate(stamp_s, period_s))
+    _refuse(folder / "stars.csv", complaint_about_fixes(data.stars, stamp_s))
+    return data
+
+
+def _refuse(path: Path, complaint: str | None) -> None:
+    if complaint is not None:
+        raise FileError(f"{path}: {complaint}.")
 
 
 def noise_of(known: dict[str, Any]) -> NoiseModel:
