@@ -47,6 +47,11 @@ class Screened:
     set_back: tuple[tuple[int, float], ...]
 
 
+def stretches_of(stamp_s: Array, hole_s: float) -> list[NDArray[np.intp]]:
+    """Return the rows of each stretch of rising stamps without a longer hole."""
+    return np.split(np.arange(len(stamp_s)), np.flatnonzero(np.diff(stamp_s) > hole_s) + 1)
+
+
 def spacing_of(stamp_s: Array) -> float:
     """Return the median spacing of rising stamps, s; NaN if there are none."""
     steps = np.diff(stamp_s[np.abs(stamp_s) < np.inf])
