@@ -1,4 +1,4 @@
-"""Calibrations of the IMU given wrong records: the good part gives the right number, or a sentence the reason."""
+"""Calibrations of the IMU given wrong records: the good part gives its number, or a sentence says why."""
 
 import json
 import shutil
