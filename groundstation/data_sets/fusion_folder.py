@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,13 @@ from groundstation.files.number_tables import load_table
 from groundstation.files.reading import read_bytes
 from groundstation.files.values import number, numbers
 from groundstation.fusion.flight_data import FlightData
-from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth, packet_density
+from groundstation.fusion.noise import (
+    GYRO_BIAS_WALK_RAD_S_RTS,
+    NoiseModel,
+    lag_of_bandwidth,
+    packet_density,
+    rounding_walk,
+)
 
 IMU_COLUMNS = ("t_s", "omega_rad_s", "ax_m_s2", "ay_m_s2", "temperature_C")
 STAR_COLUMNS = ("t_exposure_s", "t_arrival_s", "x_m", "y_m", "heading_rad")
@@ -80,6 +87,9 @@ def noise_of(known: dict[str, Any]) -> NoiseModel:
         packet_period_s=1.0 / known["imu_rate_hz"],
         gyro_density_rad_s_rthz=packet_density(known["gyro_noise_poll_rad_s"], known["gyro_lsb_rad_s"], poll),
         acc_density_m_s2_rthz=packet_density(known["acc_noise_poll_m_s2"], known["acc_lsb_m_s2"], poll),
+        gyro_bias_walk_rad_s_rts=math.hypot(
+            GYRO_BIAS_WALK_RAD_S_RTS, rounding_walk(known["gyro_noise_poll_rad_s"], known["gyro_lsb_rad_s"])
+        ),
         star_sigma_xy_m=known["star_sigma_xy_m"],
         star_sigma_heading_rad=known["star_sigma_heading_rad"],
         fix_time_sigma_s=FIX_TIME_POLLS / poll,
