@@ -11,6 +11,7 @@ import numpy as np
 from groundstation.data_sets.stamp_words import (
     complaint_about_bunches,
     complaint_about_fixes,
+    complaint_about_order,
     complaint_about_rate,
     complaint_about_start,
     complaint_about_units,
@@ -60,7 +61,9 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     table = load_table(path, IMU_COLUMNS, is_finite=False)
     imu, noise = table.numbers, noise_of(known)
     period_s = noise.packet_period_s
-    _refuse(path, complaint_about_units(imu[:, 0], period_s) or complaint_about_bunches(imu, period_s))
+    _refuse(path, complaint_about_order(imu[:, 0]))
+    _refuse(path, complaint_about_units(imu[:, 0], period_s))
+    _refuse(path, complaint_about_bunches(imu, period_s))
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers

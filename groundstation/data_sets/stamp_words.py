@@ -20,6 +20,7 @@ LEAST_ROWS = 20
 LEAST_SINGLE = 0.25
 """Share of the rows that follow on the one before; below, most packets would have been lost."""
 MOST_EQUAL = 0.1
+MOST_FALLING = 0.1
 LATEST_START = 1.0
 """The record begins before this many of its durations have passed."""
 NAMED = 3
@@ -28,6 +29,14 @@ ASIDE_WORDS = {
     FAR: "is far from the rows around it",
     BEHIND: "is not after the one before",
 }
+
+
+def complaint_about_order(stamp_s: Array) -> str | None:
+    """Return why the rows are not in the order of time; None if they are, but for some."""
+    falling = float((np.diff(stamp_s) < 0.0).mean()) if len(stamp_s) > LEAST_ROWS else 0.0
+    if falling <= MOST_FALLING:
+        return None
+    return f"t_s falls in {100.0 * falling:.0f} % of the rows: sort them by time, the oldest first"
 
 
 def complaint_about_units(stamp_s: Array, period_s: float) -> str | None:
@@ -146,7 +155,7 @@ def notes_of(found: Screened, given_s: Array, lines: Sequence[int], name: str) -
             f"{name}: {len(rows)} of {len(given_s)} packets set aside, t_s {ASIDE_WORDS[reason]}: {word} "
             f"{where}{more}"
         )
-    for row, back_s in found.set_back:
+    for row, back_s in found.set_back[:NAMED]:
         notes.append(
             f"{name}: line {lines[row]}, the clock is set back by {back_s:.6g} s; seconds are counted on"
         )

@@ -135,6 +135,14 @@ def test_stamps_of_deliveries_are_refused(flight, size, apart_s):
         flight.run()
 
 
+@pytest.mark.parametrize("order", ["newest first", "shuffled"])
+def test_rows_that_are_not_in_the_order_of_time_are_refused(flight, order):
+    rows = np.arange(len(flight.imu))[::-1]
+    flight.imu = flight.imu[rows if order == "newest first" else np.random.default_rng(0).permutation(rows)]
+    with pytest.raises(FileError, match="sort them by time"):
+        flight.run()
+
+
 def test_wild_moments_of_fixes_cost_these_fixes(flight):
     flight.stars[20, 1], flight.stars[25, 1], flight.stars[27, 1], flight.stars[30, 0] = (
         1e9,
