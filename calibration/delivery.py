@@ -1,8 +1,9 @@
 """A calibration's result delivered: files together or not at all, words to the terminal."""
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from calibration.outcome import CalibrationRefusedError, Outcome
@@ -14,12 +15,18 @@ from groundstation.files.writing import Content, write_files
 
 
 @contextmanager
-def refusing(source: Path | str | None = None) -> Iterator[None]:
-    """Turn a refused calibration into a usage error, which names its source if the refusal does not."""
+def refusing(source: Path | str | None = None, aside: Sequence[str] = ()) -> Iterator[None]:
+    """Turn a refused calibration into a usage error, which names its source if the refusal does not.
+
+    Args:
+        source: What was read.
+        aside: What of it was set aside, a sentence each.
+    """
     try:
         yield
     except CalibrationRefusedError as error:
-        raise UsageError(f"{error}." if source is None else f"{source}: {error}.") from error
+        text = "; ".join([str(error), *aside])
+        raise UsageError(f"{text}." if source is None else f"{source}: {text}.") from error
 
 
 def deliver(
@@ -29,6 +36,7 @@ def deliver(
     plot: Path | None = None,
     camera_out: Path | None = None,
     also: Mapping[Path, Content] | None = None,
+    aside: Sequence[str] = (),
 ) -> None:
     """Write a result with its provenance, the camera and the figure; print summary and warnings.
 
@@ -39,16 +47,19 @@ def deliver(
         plot: PNG to write, if wanted.
         camera_out: camera.json to write, if wanted.
         also: Further files by name.
+        aside: What of the data was set aside, a sentence each.
 
     Raises:
         FileError: A file cannot be written; then none is.
     """
+    if aside:
+        found = replace(found, notes={**found.notes, "set_aside": list(aside)})
     contents: dict[Path, Content] = {**(also or {}), out: found.to_toml(provenance)}
     if camera_out is not None and found.camera is not None:
         contents[camera_out] = json_text(found.camera.to_mapping())
     if plot is not None and found.draw is not None:
         contents[plot] = png_of(found.draw())
     write_files(contents)
-    for warning in found.warnings:
+    for warning in (*aside, *found.warnings):
         sys.stderr.write(f"{provenance.recording}: {warning}.\n")
     print(found.summary)

@@ -13,7 +13,7 @@ import typer
 from calibration.delivery import deliver, refusing
 from calibration.flights import read_flight
 from calibration.imu import joint as joint_procedure
-from calibration.imu import procedures
+from calibration.imu import noise, procedures
 from calibration.imu import tilt as tilt_procedure
 from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
@@ -75,9 +75,12 @@ def gyro_scale(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = N
 def allan(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
     """Allan deviation: white noise, bias instability, from a long rest.
 
+    White noise takes some seconds; a bias instability ten times the averaging time at which the curve turns
+    up again: 17 min for a floor at 100 s. What the record is too short for is said, not printed.
+
     Example: groundstation calibrate allan night_at_rest/ --out noise.toml --plot noise.png
     """
-    _calibrate(source, vehicle, procedures.noise_at_rest, out, plot, with_stars=False)
+    _calibrate(source, vehicle, noise.noise_at_rest, out, plot, with_stars=False)
 
 
 def tilt(
@@ -111,14 +114,15 @@ def tilt(
         raise UsageError(f"--tilt-sigma-deg must be above zero, found {tilt_sigma_deg:g}.")
     known = None if table_map is None else TableMap.load(table_map)
     given = None if tilts is None else tilt_procedure.load_tilts(tilts)
-    rests = tilt_procedure.RestsFound()
+    rests, notes = tilt_procedure.RestsFound(), []
     for path in recordings:
         data = read_flight(path, vehicle, with_stars=not (tilts is not None and path.is_dir()))
-        with refusing(path):
+        notes += [f"{path.name}: {note}" for note in data.notes]
+        with refusing(path, data.notes):
             rests += tilt_procedure.rests_of(path.name, data, least_s, known)
     with refusing(", ".join(path.name for path in recordings)):
         found = tilt_procedure.axes_of(rests, given, math.radians(tilt_sigma_deg), known)
-    deliver(found, provenance_of_several(recordings), out, plot)
+    deliver(found, provenance_of_several(recordings), out, plot, aside=notes)
 
 
 def joint(
@@ -146,11 +150,11 @@ def joint(
 
     check_targets(out, plot, table_map)
     data = read_flight(source, vehicle)
-    with refusing(source):
+    with refusing(source, data.notes):
         made = None if table_map is None else map_of_sources([read_source(source, None, vehicle)])[1]
         found = joint_procedure.constants_of_flight(data)
     also = {} if made is None or table_map is None else made.files(table_map)
-    deliver(found, provenance_of(source), out, plot, also=also)
+    deliver(found, provenance_of(source), out, plot, also=also, aside=data.notes)
 
 
 def _calibrate(
@@ -164,6 +168,6 @@ def _calibrate(
 ) -> None:
     check_targets(out, plot)
     data = read_flight(source, vehicle, with_stars=with_stars)
-    with refusing(source):
+    with refusing(source, data.notes):
         found = procedure(data)
-    deliver(found, provenance_of(source), out, plot)
+    deliver(found, provenance_of(source), out, plot, aside=data.notes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,13 +26,12 @@ def _axes(figure: Figure, rows: int) -> list[Any]:
     return list(np.atleast_1d(figure.subplots(rows, 1, sharex=True)))
 
 
-def draw_rest(rest: Array, found: ZeroOffset) -> Figure:
-    """Draw the rest's packets (n, 5), its mean, and what was cut out."""
+def draw_rest(t_s: Array, readings: Array, found: ZeroOffset, labels: Sequence[str]) -> Figure:
+    """Draw the rest's packets (n, c), their mean, and what was cut out."""
     figure = new_figure(9.0, 7.0)
-    for k, (axes, label) in enumerate(
-        zip(_axes(figure, 3), ("rate, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
-    ):
-        axes.plot(rest[:, 0], rest[:, k + 1], ".", markersize=2, color="0.5", label="packets")
+    axes_of = _axes(figure, len(labels))
+    for k, (axes, label) in enumerate(zip(axes_of, labels, strict=True)):
+        axes.plot(t_s, readings[:, k], ".", markersize=2, color="0.5", label="packets")
         axes.axhline(
             found.mean[k], color="tab:blue", label=f"mean {found.mean[k]:.6f} ± {found.mean_sigma[k]:.1g}"
         )
@@ -47,13 +46,12 @@ def draw_rest(rest: Array, found: ZeroOffset) -> Figure:
     return figure
 
 
-def draw_temperature(found: TemperatureSlope) -> Figure:
+def draw_temperature(found: TemperatureSlope, labels: Sequence[str]) -> Figure:
     """Draw block means against temperature with the fitted lines."""
     figure = new_figure(8.0, 7.0)
     heat = found.block_temperature_c
-    for k, (axes, label) in enumerate(
-        zip(_axes(figure, 3), ("rate, rad/s", "ax, m/s²", "ay, m/s²"), strict=True)
-    ):
+    axes_of = _axes(figure, len(labels))
+    for k, (axes, label) in enumerate(zip(axes_of, labels, strict=True)):
         axes.plot(heat, found.block_mean[:, k], ".", color="0.4")
         axes.plot(heat, found.at_reference[k] + found.slope[k] * (heat - found.reference_c), color="tab:blue")
         axes.set_ylabel(label)
@@ -88,7 +86,8 @@ def draw_allan(curves: dict[str, AllanDeviation], units: dict[str, str]) -> Figu
         axes.plot(
             curve.tau_s, curve.random_walk / np.sqrt(curve.tau_s), "--", color="0.5", label="white noise"
         )
-        axes.axhline(curve.bias_instability * 0.664, color="tab:red", linewidth=0.8, label="lowest point")
+        lowest = "floor" if curve.is_floor_seen else "lowest point: an upper limit"
+        axes.axhline(curve.deviation.min(), color="tab:red", linewidth=0.8, label=lowest)
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylabel(f"{name}, {units[name].replace('^2', '²')}")

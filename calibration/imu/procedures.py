@@ -8,16 +8,16 @@ from functools import partial
 import numpy as np
 
 from calibration.imu import figures
-from calibration.imu.allan import allan_deviation, bridge_holes
+from calibration.imu.channels import UNITS, Alive, alive_channels, complaint_about
+from calibration.imu.everyday_units import lines_of
 from calibration.imu.gyro_scale import gyro_scale
 from calibration.imu.temperature import temperature_slope
 from calibration.imu.zero_offset import Disturbance, ZeroOffset, zero_offset
 from calibration.outcome import CalibrationRefusedError, Note, Outcome
-from calibration.result import Quantity, quantity_lines
+from calibration.result import Quantity
 from groundstation.fusion.flight_data import Array, FlightData
 from groundstation.fusion.stretch import fit_stretch
 
-UNITS = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}
 LEAST_REST_S = 1.0
 WILD_RATE_RAD_S = math.radians(400.0)
 SPIKE_SIGMAS = 12.0
@@ -29,19 +29,20 @@ def offsets_at_rest(data: FlightData) -> Outcome:
     Raises:
         NotARest: It was none.
     """
-    found = _rest(data)
+    found, alive = rest_of(data)
     cut = [words_of(each) for each in found.disturbances]
     quantities = {
-        f"{name}_offset": Quantity(float(found.mean[k]), float(found.mean_sigma[k]), unit)
-        for k, (name, unit) in enumerate(UNITS.items())
+        f"{name}_offset": Quantity(float(found.mean[k]), float(found.mean_sigma[k]), UNITS[name])
+        for k, name in enumerate(alive.names)
     }
+    rest = data.at_rest()
     return Outcome(
         title="Zero offsets at rest",
-        summary="\n".join([*quantity_lines(quantities), *(f"  cut out: {line}" for line in cut)]),
+        summary="\n".join([*lines_of(quantities), *(f"  cut out: {line}" for line in cut)]),
         quantities=quantities,
         residual={
-            f"{name}_packet_sigma": Quantity(float(found.packet_sigma[k]), math.nan, unit)
-            for k, (name, unit) in enumerate(UNITS.items())
+            f"{name}_packet_sigma": Quantity(float(found.packet_sigma[k]), math.nan, UNITS[name])
+            for k, name in enumerate(alive.names)
         },
         notes={
             "temperature_C": found.temperature_c,
@@ -49,7 +50,8 @@ def offsets_at_rest(data: FlightData) -> Outcome:
             "duration_s": found.duration_s,
             "cut": cut,
         },
-        draw=partial(figures.draw_rest, data.at_rest(), found),
+        draw=partial(figures.draw_rest, rest[:, 0], readings_of(rest, alive), found, labels_of(alive)),
+        warnings=alive.complaints,
     )
 
 
@@ -86,22 +88,26 @@ def temperature_slopes(data: FlightData) -> Outcome:
         CalibrationRefusedError: It is too short, or the temperature changed too little.
     """
     rest = data.at_rest()
-    found = temperature_slope(rest[:, 0], rest[:, 1:4], rest[:, 4])
-    units = list(enumerate(UNITS.items()))
+    alive = _alive(rest)
+    found = temperature_slope(rest[:, 0], readings_of(rest, alive), rest[:, 4])
     slopes = {
-        f"{name}_slope": Quantity(float(found.slope[k]), float(found.slope_sigma[k]), f"{unit}/C")
-        for k, (name, unit) in units
+        f"{name}_slope": Quantity(float(found.slope[k]), float(found.slope_sigma[k]), f"{UNITS[name]}/C")
+        for k, name in enumerate(alive.names)
     }
     values = {
-        f"{name}_at_reference": Quantity(float(found.at_reference[k]), math.nan, unit)
-        for k, (name, unit) in units
+        f"{name}_at_reference": Quantity(float(found.at_reference[k]), math.nan, UNITS[name])
+        for k, name in enumerate(alive.names)
     }
     return _outcome(
         "Temperature slopes of the zero offsets",
         slopes | values,
-        {name: Quantity(float(found.residual_rms[k]), math.nan, unit) for k, (name, unit) in units},
+        {
+            name: Quantity(float(found.residual_rms[k]), math.nan, UNITS[name])
+            for k, name in enumerate(alive.names)
+        },
         {"reference_C": found.reference_c, "span_C": found.span_c},
-        partial(figures.draw_temperature, found),
+        partial(figures.draw_temperature, found, labels_of(alive)),
+        alive.complaints,
     )
 
 
@@ -109,10 +115,18 @@ def gyro_scale_by_turns(data: FlightData) -> Outcome:
     """Find scale and null of the gyro by full turns against the stars.
 
     Raises:
-        CalibrationRefusedError: There are too few fixes, or no full turn.
+        CalibrationRefusedError: There are too few fixes, no full turn, or headings that do not follow.
     """
     imu, stars = data.imu, data.stars[np.argsort(data.stars[:, 0], kind="stable")]
+    complaint = complaint_about(imu[:, 1])
+    if complaint is not None:
+        raise CalibrationRefusedError(f"omega {complaint}")
     good = np.isfinite(imu[:, 1]) & (np.abs(imu[:, 1]) < WILD_RATE_RAD_S)
+    if good.mean() < 0.5:
+        raise CalibrationRefusedError(
+            f"omega is beyond {math.degrees(WILD_RATE_RAD_S):.0f} deg/s in "
+            f"{100 * (1 - good.mean()):.0f} % of the packets: in deg/s? rad/s are expected"
+        )
     t, rate = imu[good, 0], imu[good, 1]
     span = np.diff(t, prepend=t[0] - data.noise.packet_period_s)
     found = gyro_scale(t, span, _without_spikes(rate), stars[:, 0], stars[:, 4], _null(data))
@@ -128,38 +142,39 @@ def gyro_scale_by_turns(data: FlightData) -> Outcome:
     )
 
 
-def noise_at_rest(data: FlightData) -> Outcome:
-    """Find white noise and bias instability from the Allan deviation of a long rest.
-
-    Raises:
-        CalibrationRefusedError: It is too short.
-    """
-    rest, found_rest = data.at_rest(), _rest(data)
-    wild = {d.start_s for d in found_rest.disturbances if d.kind == "wild packet"}
-    rest = rest[[t not in wild for t in rest[:, 0].tolist()]]
-    period = data.noise.packet_period_s
-    even = bridge_holes(rest[:, 0], rest[:, 1:4], period)
-    curves = {name: allan_deviation(even[:, k], period) for k, name in enumerate(UNITS)}
-    quantities = {}
-    for name, curve in curves.items():
-        relative = float(curve.sigma[0] / curve.deviation[0])
-        quantities[f"{name}_random_walk"] = Quantity(
-            curve.random_walk, curve.random_walk * relative, f"{UNITS[name]} sqrt(s)"
-        )
-        quantities[f"{name}_bias_instability"] = Quantity(curve.bias_instability, math.nan, UNITS[name])
-    return _outcome(
-        "White noise and bias instability (Allan deviation)",
-        quantities,
-        {},
-        {f"{name}_instability_is_upper_limit": not curve.is_floor_seen for name, curve in curves.items()},
-        partial(figures.draw_allan, curves, UNITS),
-    )
-
-
 def words_of(cut: Disturbance) -> str:
     """Return what was cut out of a rest, in words."""
     span = f"from {cut.start_s:.2f} to {cut.end_s:.2f} s"
     return f"{cut.kind} in {cut.channel} {span}, {cut.size:.2g} {UNITS[cut.channel]}"
+
+
+def rest_of(data: FlightData) -> tuple[ZeroOffset, Alive]:
+    """Judge the rest at the start, and return what its living channels read.
+
+    Raises:
+        NotARest: It was none.
+        CalibrationRefusedError: No channel is alive.
+    """
+    rest = data.at_rest()
+    alive = _alive(rest)
+    found = zero_offset(rest[:, 0], readings_of(rest, alive), rest[:, 4], alive.names)
+    return found, alive
+
+
+def readings_of(rest: Array, alive: Alive) -> Array:
+    """Return the living channels (n, c) of packets (n, 5)."""
+    return rest[:, [1 + k for k in alive.columns]]
+
+
+def labels_of(alive: Alive) -> list[str]:
+    """Return names with units, for figures."""
+    return [f"{name}, {UNITS[name]}".replace("^2", "²") for name in alive.names]
+
+
+def _alive(rest: Array) -> Alive:
+    if not len(rest):
+        raise CalibrationRefusedError("there is no packet of a rest at the start")
+    return alive_channels(rest[:, 1:4])
 
 
 def _outcome(
@@ -168,18 +183,17 @@ def _outcome(
     residual: dict[str, Quantity],
     notes: dict[str, Note],
     draw: figures.Draw,
+    warnings: tuple[str, ...] = (),
 ) -> Outcome:
-    return Outcome(title, "\n".join(quantity_lines(quantities)), quantities, residual, notes, draw)
-
-
-def _rest(data: FlightData) -> ZeroOffset:
-    rest = data.at_rest()
-    return zero_offset(rest[:, 0], rest[:, 1:4], rest[:, 4])
+    return Outcome(title, "\n".join(lines_of(quantities)), quantities, residual, notes, draw, warnings)
 
 
 def _null(data: FlightData) -> float:
     """Return the gyro's null by the rest at the start, 0 without one."""
-    return float(_rest(data).mean[0]) if data.run_start_s > LEAST_REST_S else 0.0
+    if data.run_start_s <= LEAST_REST_S:
+        return 0.0
+    rest = data.at_rest()
+    return float(zero_offset(rest[:, 0], rest[:, 1:2], rest[:, 4], ("omega",)).mean[0])
 
 
 def _without_spikes(values: Array) -> Array:

@@ -19,20 +19,20 @@ LEAST_SPAN_C = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TemperatureSlope:
-    """Offset = at_reference + slope (T - reference), for rate rad/s, ax and ay m/s^2."""
+    """Offset = at_reference + slope (T - reference), for each channel that was given."""
 
     slope: Array
-    """(3,) per degree."""
+    """(c,) per degree."""
     slope_sigma: Array
     at_reference: Array
     reference_c: float
     span_c: float
     residual_rms: Array
-    """(3,) of the block means."""
+    """(c,) of the block means."""
     block_t_s: Array
     block_temperature_c: Array
     block_mean: Array
-    """(m, 3)."""
+    """(m, c)."""
 
 
 def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> TemperatureSlope:
@@ -43,7 +43,7 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
 
     Args:
         t_s: (n,) stamps of a rest, ascending.
-        readings: (n, 3) rate rad/s, ax, ay m/s^2.
+        readings: (n, c) rate rad/s, ax, ay m/s^2, or those of them that are alive.
         temperature_c: (n,).
 
     Raises:
@@ -75,8 +75,9 @@ def temperature_slope(t_s: Array, readings: Array, temperature_c: Array) -> Temp
         )
     reference = float(heat.mean())
     A = np.column_stack([np.ones_like(heat), heat - reference])
-    found, sigma, left = np.zeros((2, 3)), np.zeros(3), np.zeros_like(means)
-    for c in range(3):
+    channels = means.shape[1]
+    found, sigma, left = np.zeros((2, channels)), np.zeros(channels), np.zeros_like(means)
+    for c in range(channels):
         found[:, c], sigma[c] = _weighted(A, means[:, c])
         left[:, c] = means[:, c] - A @ found[:, c]
     rms = np.sqrt((left**2).mean(axis=0))

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration.imu.channels import alive_channels
 from calibration.imu.figures import draw_tilt
 from calibration.imu.procedures import words_of
 from calibration.imu.rest_search import find_rests
 from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import NotARest, zero_offset
-from calibration.outcome import Outcome
+from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity
 from groundstation.declarations.errors import UsageError
 from groundstation.files.number_tables import load_table
@@ -74,9 +75,12 @@ def rests_of(name: str, data: FlightData, least_s: float, known: TableMap | None
         known: How the table pulls.
 
     Raises:
-        CalibrationRefusedError: There are too few packets.
+        CalibrationRefusedError: There are too few packets, or a channel is stuck.
     """
     imu, found = data.imu, RestsFound()
+    alive = alive_channels(imu[:, 1:4])
+    if alive.complaints:
+        raise CalibrationRefusedError("; ".join(alive.complaints))
     finite = imu[np.isfinite(imu[:, 1:4]).all(axis=1)]
     for start_s, stop_s in find_rests(finite[:, 0], finite[:, 1:4], least_s, _loudest(data.noise)):
         inside = (imu[:, 0] > start_s) & (imu[:, 0] <= stop_s)

@@ -7,6 +7,7 @@ further from the others than the packets' own noise allows are named and cut out
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,24 +53,27 @@ class ZeroOffset:
     """Offsets of rate rad/s, ax and ay m/s^2 at rest; on a slope the accelerometers' hold its gravity."""
 
     mean: Array
-    """(3,)."""
+    """(c,) of the channels that were given."""
     mean_sigma: Array
-    """(3,) of the mean: white noise, and the wandering seen between blocks."""
+    """(c,) of the mean: white noise, and the wandering seen between blocks."""
     packet_sigma: Array
-    """(3,) of one packet."""
+    """(c,) of one packet."""
     temperature_c: float
     packets: int
     duration_s: float
     disturbances: tuple[Disturbance, ...]
 
 
-def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset:
+def zero_offset(
+    t_s: Array, readings: Array, temperature_c: Array, channels: Sequence[str] = CHANNELS
+) -> ZeroOffset:
     """Return the mean of the undisturbed part of a rest.
 
     Args:
         t_s: (n,) stamps, ascending.
-        readings: (n, 3) rate rad/s, ax, ay m/s^2.
+        readings: (n, c) rate rad/s, ax, ay m/s^2, or those of them that are alive.
         temperature_c: (n,), NaN where unknown.
+        channels: Names of the c.
 
     Raises:
         NotARest: too short, or disturbed for more than half of the time.
@@ -83,9 +87,11 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     median = np.median(readings, axis=0)
     blocks = np.arange(n) // size
     is_wild = _wild(readings, median, sigma)
-    found = _jumps(t_s, readings, median, sigma, is_wild)
+    found = _jumps(t_s, readings, median, sigma, is_wild, channels)
     count = int(blocks[-1]) + 1
-    sums = np.array([np.bincount(blocks, np.where(is_wild, 0.0, readings[:, c]), count) for c in range(3)]).T
+    sums = np.array(
+        [np.bincount(blocks, np.where(is_wild, 0.0, readings[:, c]), count) for c in range(len(channels))]
+    ).T
     weight = np.bincount(blocks, ~is_wild, count)
     means = sums / np.maximum(weight, 1)[:, None]
     centre = np.median(means, axis=0)
@@ -94,7 +100,9 @@ def zero_offset(t_s: Array, readings: Array, temperature_c: Array) -> ZeroOffset
     white = sigma / np.sqrt(size)
     limit = BLOCK_SIGMAS * np.clip(wander, white, MAX_WANDER * white)
     is_bad = (np.abs(means - centre) > limit).any(axis=1) | (weight < size / 4)
-    found += _disturbances(t_s, np.where(is_wild[:, None], np.nan, readings), blocks, is_bad, centre, limit)
+    found += _disturbances(
+        t_s, np.where(is_wild[:, None], np.nan, readings), blocks, is_bad, centre, limit, channels
+    )
     for k in range(1, MARGIN_BLOCKS + 1):
         wide = is_bad.copy()
         wide[k:] |= is_bad[:-k]
@@ -144,7 +152,12 @@ def _wild(readings: Array, median: Array, sigma: Array) -> NDArray[np.bool_]:
 
 
 def _jumps(
-    t_s: Array, readings: Array, median: Array, sigma: Array, is_wild: NDArray[np.bool_]
+    t_s: Array,
+    readings: Array,
+    median: Array,
+    sigma: Array,
+    is_wild: NDArray[np.bool_],
+    channels: Sequence[str],
 ) -> list[Disturbance]:
     """Name the packets that jump away and back: one alone is wild, two in a row were knocked."""
     out = []
@@ -154,7 +167,7 @@ def _jumps(
         channel = int(np.argmax(np.max(off / np.maximum(sigma, 1e-300), axis=0)))
         kind = "wild packet" if len(run) == 1 else "knock"
         start, end = float(t_s[run[0]]), float(t_s[run[-1]])
-        out.append(Disturbance(start, end, kind, CHANNELS[channel], float(np.max(off[:, channel]))))
+        out.append(Disturbance(start, end, kind, channels[channel], float(np.max(off[:, channel]))))
     return out
 
 
@@ -165,6 +178,7 @@ def _disturbances(
     is_bad: NDArray[np.bool_],
     centre: Array,
     limit: Array,
+    channels: Sequence[str],
 ) -> list[Disturbance]:
     """Join neighbouring disturbed blocks and name each stretch; wild packets are NaN in `readings`."""
     edges = np.diff(np.concatenate([[0], is_bad.astype(int), [0]]))
@@ -177,5 +191,5 @@ def _disturbances(
         channel = int(np.argmax(np.nanmax(off / limit, axis=0)))
         start, end = float(t_s[rows][0]), float(t_s[rows][-1])
         kind = "knock" if end - start <= LONGEST_KNOCK_S else "touch"
-        out.append(Disturbance(start, end, kind, CHANNELS[channel], float(np.nanmax(off[:, channel]))))
+        out.append(Disturbance(start, end, kind, channels[channel], float(np.nanmax(off[:, channel]))))
     return out

@@ -132,7 +132,7 @@ def delay(
     """
     check_targets(out, plot)
     turns = read_turns(source, vehicle)
-    with refusing(source), progress_line() as progress:
+    with refusing(source, turns.notes), progress_line() as progress:
         found = delay_from_headings(
             turns.gyro_t_s,
             turns.rate_rad_s,
@@ -141,7 +141,7 @@ def delay(
             guess_s=turns.guess_s if guess_s is None else guess_s,
             progress=progress,
         )
-    deliver(found, provenance_of(source, files=turns.files), out, plot)
+    deliver(found, provenance_of(source, files=turns.files), out, plot, aside=turns.notes)
 
 
 def survey(

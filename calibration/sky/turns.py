@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.flights import read_flight
+from groundstation.data_sets.stamp_words import notes_of
 from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
 from groundstation.files.number_tables import load_table
+from groundstation.fusion.stamp_screen import screen_stamps, spacing_of, stretches_of
 
 Array = NDArray[np.float64]
 
 GUESS_S = 0.05
 """Of the delay, where no rig states one."""
+HOLE_S = 0.5
+"""What the gyro turned in a longer hole is not known."""
+SLOWEST_S = 0.5
+"""Samples further apart cannot show a turn to and fro; or they are not stamped in seconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +36,7 @@ class Turns:
         heading_rad: Headings by the stars.
         guess_s: First guess of the delay: the rig's.
         files: What was read.
+        notes: What of it was set aside, a sentence each.
     """
 
     gyro_t_s: Array
@@ -37,6 +45,7 @@ class Turns:
     heading_rad: Array
     guess_s: float
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
 
 def read_turns(source: Path, vehicle: str | None) -> Turns:
@@ -55,12 +64,44 @@ def read_turns(source: Path, vehicle: str | None) -> Turns:
     """
     if source.is_dir():
         files = source / "imu.csv", source / "stars.csv"
-        gyro = load_table(files[0], ("t_s", "omega_rad_s")).numbers
+        table = load_table(files[0], ("t_s", "omega_rad_s"))
+        gyro = table.numbers
         stars = load_table(files[1], ("t_arrival_s", "heading_rad")).numbers
-        return Turns(gyro[:, 0], gyro[:, 1], stars[:, 0], stars[:, 1], GUESS_S, files)
+        spacing_s = spacing_of(gyro[:, 0])
+        if not spacing_s < SLOWEST_S:
+            raise FileError(f"{files[0]}: t_s rises by {spacing_s:g} from row to row: seconds are expected.")
+        found = screen_stamps(gyro[:, 0], spacing_s)
+        if found.set_back:
+            raise FileError(
+                f"{files[0]}: line {table.lines[found.set_back[0][0]]}, the clock is set back by "
+                f"{found.set_back[0][1]:.6g} s: give the part before or after it."
+            )
+        notes = notes_of(found, gyro[:, 0], table.lines.tolist(), files[0].name)
+        good = np.isfinite(found.stamp_s)
+        once = np.unique(stars, axis=0)
+        if len(once) < len(stars):
+            notes = (*notes, f"{files[1].name}: {len(stars) - len(once)} of {len(stars)} rows came twice")
+        t, rate = gyro[good].T
+        return _longest(Turns(t, rate, once[:, 0], once[:, 1], GUESS_S, files, notes))
     data = read_flight(source, vehicle, rates_only=True)
     if not len(data.stars):
         raise UsageError(f"{source}: holds {len(data.imu)} IMU samples and no star fix.")
     delay_s = data.stamp_delay_s
     exposure_s, heading_rad = data.stars[:, 0], data.stars[:, 4]
-    return Turns(data.imu[:, 0], data.imu[:, 1], exposure_s + delay_s, heading_rad, delay_s, (source,))
+    arrival_s = exposure_s + delay_s
+    turns = Turns(data.imu[:, 0], data.imu[:, 1], arrival_s, heading_rad, delay_s, (source,), data.notes)
+    return _longest(turns)
+
+
+def _longest(turns: Turns) -> Turns:
+    """Return the longest stretch without a hole in the gyro's samples."""
+    stretches = stretches_of(turns.gyro_t_s, HOLE_S)
+    rows = max(stretches, key=len)
+    if len(stretches) == 1:
+        return turns
+    note = (
+        f"the gyro's samples have {len(stretches) - 1} holes; the longest stretch is used, "
+        f"{turns.gyro_t_s[rows[0]]:.6g} to {turns.gyro_t_s[rows[-1]]:.6g} s"
+    )
+    t, rate = turns.gyro_t_s[rows], turns.rate_rad_s[rows]
+    return replace(turns, gyro_t_s=t, rate_rad_s=rate, notes=(*turns.notes, note))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,7 @@ from groundstation.files.writing import write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, FixOutcome, PlanarState
 from groundstation.fusion.estimators import ESTIMATORS
-from groundstation.fusion.flight_data import FlightData, estimate
+from groundstation.fusion.flight_data import FlightData, estimate, lost_spans
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.fusion.slope_grid import noise_with, slope_grid
@@ -72,14 +73,16 @@ def run(
         states, accounts = estimate(data, estimator, partial(progress, "estimating"))
     if isinstance(estimator, OfflineSmoother):
         later = iter(estimator.states())
-        states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0]]
+        states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0].tolist()]
     write_files(
         {
             out: _estimate_lines(data, states),
             out.with_name("fixes.csv"): _fix_lines(accounts),
         }
     )
-    _summarise(states, accounts, estimator)
+    for note in data.notes:
+        sys.stderr.write(f"{note}.\n")
+    _summarise(data, states, accounts, estimator)
 
 
 def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth: bool) -> Estimator:
@@ -96,8 +99,9 @@ def _estimate_lines(data: FlightData, states: list[PlanarState | None]) -> Itera
     yield ESTIMATE_HEADER
     empty = ",nan" * 12 + "\n"
     form = ",%.7f,%.7f,%.7f,%.7f,%.7f,%.7f,%.8f,%.8f,%.8f,%.7f,%.7f,%.8f\n"
-    for t, state in zip(data.imu[:, 0].tolist(), states, strict=True):
-        yield f"{t:.6f}" + (empty if state is None else form % state[1:13])
+    given_s = data.imu[:, 0] if data.given_s is None else data.given_s
+    for t, state in zip(given_s.tolist(), states, strict=True):
+        yield (f"{t:.6f}" if abs(t) < 1e15 else repr(t)) + (empty if state is None else form % state[1:13])
 
 
 def _fix_lines(accounts: list[FixOutcome]) -> Iterator[str]:
@@ -109,10 +113,12 @@ def _fix_lines(accounts: list[FixOutcome]) -> Iterator[str]:
         )
 
 
-def _summarise(states: list[PlanarState | None], accounts: list[FixOutcome], estimator: Estimator) -> None:
+def _summarise(
+    data: FlightData, states: list[PlanarState | None], accounts: list[FixOutcome], estimator: Estimator
+) -> None:
     used = sum(account.used for account in accounts)
     print(f"{len(states)} packets, {len(accounts)} fixes, {used} used.")
     for name, count in sorted(estimator.counters.by_name.items()):
         print(f"  {name.replace('_', ' ')}: {count}")
-    if states and states[-1] is not None and states[-1].is_lost:
-        print("  the estimate was lost at the end")
+    for start_s, stop_s in lost_spans(data, states):
+        print(f"  the estimate was lost from {start_s:.2f} to {stop_s:.2f} s")

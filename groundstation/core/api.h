@@ -155,6 +155,7 @@ enum {
     WILD = 2,     /* the readings jumped away: the last good ones were taken */
     HOLE = 4,     /* packets are missing before this one: there is a row for them too */
     DISAGREE = 8, /* the stamp is too far from the tick: it was followed */
+    AHEAD = 16,   /* the stamp is so far ahead of the ticks that it needs a witness: nothing was done */
 };
 
 /* A row of the history; see packet_history.py. */
@@ -187,12 +188,12 @@ typedef struct {
     Packet row, hole_row; /* new ones of the history, that of a hole before the packet's */
 
     /* constants */
-    double period_s, max_jitter_s, stamp_gain;
+    double period_s, max_jitter_s, stamp_gain, max_ahead_s;
     double gyro_lag_s, acc_lag_s, lag_difference_s;
     double max_rate_step, max_force_step, full_rate, full_force;
 
     /* clock */
-    int64_t is_restarted; /* take the next packet although its stamp lies behind */
+    int64_t is_restarted; /* take the next packet although its stamp lies behind or far ahead */
     int64_t origin_ns, newest_ns;
     double newest_s;
     int64_t is_begun; /* a packet has come */

@@ -102,6 +102,9 @@ int gs_reckoner_add(Reckoner *r) {
     double dt = asked.dt_s;
     int flags = 0;
     if (t_ns <= r->newest_ns && !r->is_restarted) return BEHIND;
+    if (r->is_begun && !r->is_restarted &&
+        (double)(t_ns - r->origin_ns) * 1e-9 - (r->newest_s + dt) > r->max_ahead_s)
+        return AHEAD;
     r->is_restarted = 0;
     if (!r->is_begun) { /* whatever came before the first packet is not a hole in the packets */
         dt = period;

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from groundstation.data_sets.stamp_words import (
+    complaint_about_bunches,
+    complaint_about_fixes,
+    complaint_about_order,
+    complaint_about_rate,
+    complaint_about_start,
+    complaint_about_units,
+    notes_of,
+)
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.number_tables import load_table
 from groundstation.files.reading import read_bytes
 from groundstation.files.values import number, numbers
 from groundstation.fusion.flight_data import FlightData
-from groundstation.fusion.noise import NoiseModel, lag_of_bandwidth, packet_density
+from groundstation.fusion.noise import (
+    GYRO_BIAS_WALK_RAD_S_RTS,
+    NoiseModel,
+    lag_of_bandwidth,
+    packet_density,
+    rounding_walk,
+)
 
 IMU_COLUMNS = ("t_s", "omega_rad_s", "ax_m_s2", "ay_m_s2", "temperature_C")
 STAR_COLUMNS = ("t_exposure_s", "t_arrival_s", "x_m", "y_m", "heading_rad")
@@ -41,16 +57,30 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
         raise FileError(f"{folder}: is no folder with imu.csv, stars.csv and meta.json.")
     known = read_known(folder / "meta.json")
     # what is no number is refused packet by packet, with a reason
-    imu = load_table(folder / "imu.csv", IMU_COLUMNS, is_finite=False).numbers
+    path = folder / "imu.csv"
+    table = load_table(path, IMU_COLUMNS, is_finite=False)
+    imu, noise = table.numbers, noise_of(known)
+    period_s = noise.packet_period_s
+    _refuse(path, complaint_about_order(imu[:, 0]))
+    _refuse(path, complaint_about_units(imu[:, 0], period_s))
+    _refuse(path, complaint_about_bunches(imu, period_s))
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
-    # a stamp that is no number sorts to the end, where it is refused with a reason
-    stars = stars[np.argsort(stars[:, 1], kind="stable")]
-    noise = noise_of(known)
     variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
     covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
-    return FlightData(imu, stars, covariance, known["run_start_s"], noise)
+    given = FlightData(imu, stars, covariance, known["run_start_s"], noise)
+    data = given.screened(lambda found: notes_of(found, imu[:, 0], table.lines.tolist(), path.name))
+    stamp_s = data.imu[:, 0]
+    _refuse(path, complaint_about_start(stamp_s, known["duration_s"]))
+    _refuse(path, complaint_about_rate(stamp_s, period_s))
+    _refuse(folder / "stars.csv", complaint_about_fixes(data.stars, stamp_s))
+    return data
+
+
+def _refuse(path: Path, complaint: str | None) -> None:
+    if complaint is not None:
+        raise FileError(f"{path}: {complaint}.")
 
 
 def noise_of(known: dict[str, Any]) -> NoiseModel:
@@ -60,6 +90,9 @@ def noise_of(known: dict[str, Any]) -> NoiseModel:
         packet_period_s=1.0 / known["imu_rate_hz"],
         gyro_density_rad_s_rthz=packet_density(known["gyro_noise_poll_rad_s"], known["gyro_lsb_rad_s"], poll),
         acc_density_m_s2_rthz=packet_density(known["acc_noise_poll_m_s2"], known["acc_lsb_m_s2"], poll),
+        gyro_bias_walk_rad_s_rts=math.hypot(
+            GYRO_BIAS_WALK_RAD_S_RTS, rounding_walk(known["gyro_noise_poll_rad_s"], known["gyro_lsb_rad_s"])
+        ),
         star_sigma_xy_m=known["star_sigma_xy_m"],
         star_sigma_heading_rad=known["star_sigma_heading_rad"],
         fix_time_sigma_s=FIX_TIME_POLLS / poll,

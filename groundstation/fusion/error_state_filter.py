@@ -11,7 +11,8 @@ import math
 
 from groundstation.fusion import error_state as es
 from groundstation.fusion import measurements
-from groundstation.fusion.checkpoint import Course
+from groundstation.fusion.agreement import MAX_SPEED_M_S
+from groundstation.fusion.checkpoint import Checkpoint, Course
 from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
 from groundstation.fusion.fix_judge import FixJudge
 from groundstation.fusion.noise import NoiseModel
@@ -23,6 +24,11 @@ from groundstation.fusion.trace import Trace
 LONGEST_HOLE_S = 2.0
 """Without packets for longer, forces and turns may have come and gone that no sigma holds: until a fix agrees
 the filter is lost."""
+PAUSE_S = 10.0
+"""Of such a hole nothing is integrated: the pose is unknown until two fixes agree, as at the start."""
+LOST_SPEED_M_S = MAX_SPEED_M_S
+LOST_RATE_RAD_S = 0.2
+"""What a vehicle may do while the filter is lost: its sigmas grow by that since the last used fix."""
 LOOK_NS = 1_000_000_000
 """While no fix comes, how long the local slope is taken to be what it was."""
 
@@ -51,6 +57,9 @@ class ErrorStateFilter:
         self._reported = self._judge.checkpoint
         """From which the report is reckoned."""
         self._look_due_ns = 0
+        self._fixed_s = 0.0
+        """Exposure of the last used fix."""
+        self._is_reported_lost = False
 
     @property
     def x(self) -> Array:
@@ -95,8 +104,8 @@ class ErrorStateFilter:
         reckoner = self._reckoner
         if not reckoner.add(packet):
             return None
-        if packet.dt_s > LONGEST_HOLE_S and reckoner.has_pose:
-            self._mark_hole()
+        if reckoner.crossed_s:
+            self._cross(reckoner.crossed_s)
         if self._judge.waiting:
             self._judge.retry()
             self._follow()
@@ -123,6 +132,11 @@ class ErrorStateFilter:
         now = self._course.carry(self._judge.checkpoint, self._reckoner.newest_s)
         H = measurements.reported(now.x, self._reckoner.rate_rad_s)
         C: Array = H @ now.P[: es.SIZE, : es.SIZE] @ H.T
+        if self._reckoner.is_lost:
+            since_s = self._reckoner.newest_s - self._fixed_s
+            for k, may in enumerate((LOST_SPEED_M_S, LOST_SPEED_M_S, LOST_RATE_RAD_S)):
+                C[k, k] += (may * since_s) ** 2
+                C[k + 3, k + 3] += may**2
         C[5, 5] += self.noise.gyro_density_rad_s_rthz**2 / self.noise.packet_period_s
         return C
 
@@ -154,15 +168,34 @@ class ErrorStateFilter:
         """Write down the way from the last used fix to the newest packet, for the smoother."""
         self._judge.finish()
 
-    def _mark_hole(self) -> None:
+    def _cross(self, hole_s: float) -> None:
         """Be lost after a long time without packets, unless the vehicle rests."""
-        if self._course.rests.at(self._reckoner.newest_s) is None:
-            self._reckoner.is_lost = True
-            self.counters.add("packets_missing_for_long")
+        reckoner = self._reckoner
+        reckoner.crossed_s = 0.0
+        if hole_s <= LONGEST_HOLE_S or not reckoner.has_pose:
+            return
+        if self._course.rests.at(reckoner.newest_s) is not None:
+            return
+        reckoner.is_lost = True
+        self._judge.unseen_until_s = reckoner.newest_s
+        self.counters.add("packets_missing_for_long")
+        if hole_s > PAUSE_S and self._judge.has_pose:
+            before, until_s = self._judge.checkpoint, self._judge.unseen_until_s
+            self._trust(before)
+            standing = before.x[: es.MOVING].copy()
+            standing[es.VX : es.VY + 1] = 0.0
+            reckoner.load(before.x[: es.SIZE], standing)
+            self._judge.begin_anew(until_s - hole_s, until_s)
+            self._reported = self._judge.checkpoint
+        else:
+            self._integrate_to_now()
 
     def _follow(self) -> None:
-        """Go on from another checkpoint, if fixes have made one."""
-        if self._judge.checkpoint is not self._reported:
+        """Go on from another checkpoint, if fixes have made one; tell the sigmas when lost or found."""
+        if (
+            self._judge.checkpoint is not self._reported
+            or self._reckoner.is_lost is not self._is_reported_lost
+        ):
             self._integrate_to_now()
 
     def _integrate_to_now(self) -> None:
@@ -174,4 +207,14 @@ class ErrorStateFilter:
         x = self._course.state_at(at, reckoner.newest_s, 1e-9 * LOOK_NS)
         self._look_due_ns = reckoner.newest_ns + LOOK_NS
         reckoner.load(x[: es.SIZE], x[: es.MOVING])
-        reckoner.trust(at.t_s, self._course.variance_in_time(at, reckoner.rate_rad_s))
+        self._trust(at)
+
+    def _trust(self, at: Checkpoint) -> None:
+        """Prepare the sigmas of the report from a checkpoint, wider while lost."""
+        reckoner = self._reckoner
+        variance = self._course.variance_in_time(at, reckoner.rate_rad_s)
+        self._fixed_s, self._is_reported_lost = at.t_s, reckoner.is_lost
+        if reckoner.is_lost:
+            for squared, may in ((2, LOST_SPEED_M_S), (7, LOST_SPEED_M_S), (12, LOST_RATE_RAD_S)):
+                variance[squared] += may**2
+        reckoner.trust(at.t_s, variance)

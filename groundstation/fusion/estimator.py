@@ -95,9 +95,9 @@ class Counters:
     def __init__(self) -> None:
         self.by_name: dict[str, int] = {}
 
-    def add(self, name: str) -> None:
-        """Count one more of `name`."""
-        self.by_name[name] = self.by_name.get(name, 0) + 1
+    def add(self, name: str, count: int = 1) -> None:
+        """Count one more of `name`, or several."""
+        self.by_name[name] = self.by_name.get(name, 0) + count
 
 
 class Estimator(Protocol):

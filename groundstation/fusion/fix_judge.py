@@ -46,6 +46,8 @@ class FixJudge:
         checkpoint: After the newest fix that was believed.
         has_pose: Whether there was one.
         waiting: Fixes whose packets have not come.
+        unseen_until_s: End of the last hole in which anything may have happened; no fix from before it shows
+            that the filter is found again.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class FixJudge:
         self._creep = CreepWatch()
         self.waiting: list[Fix] = []
         self._accounts: list[FixOutcome] = []
+        self.unseen_until_s = -math.inf
 
     def add(self, fix: Fix) -> FixOutcome:
         """Take a fix at its arrival and give account of it."""
@@ -86,8 +89,29 @@ class FixJudge:
 
     def finish(self) -> None:
         """Write down the way from the last used fix to the newest packet, for the smoother."""
-        if self._trace is not None and self._trace.chains:
-            self._course.carry(self.checkpoint, self._reckoner.newest_s, self._trace.chains[-1].steps)
+        self._write_down_until(self._reckoner.newest_s)
+
+    def begin_anew(self, from_s: float, until_s: float) -> None:
+        """Forget the pose: nobody knows what happened between these moments.
+
+        Args:
+            from_s: End of the last packet before.
+            until_s: End of the first one after.
+        """
+        self._write_down_until(from_s)
+        self.has_pose = False
+        at = self.checkpoint
+        limits = np.minimum(es.initial_variance(self._noise), es.reopened_variance())
+        self.checkpoint = replace(self._course.unknown(), t_s=until_s, x=at.x[: es.SIZE], P=np.diag(limits))
+        self._first_fixes = FirstFixes()
+        self._refused.clear()
+        self._past.forget()
+        self._creep.forget()
+        self._course.forget_before(until_s, keep_packets=self._trace is not None)
+
+    def _write_down_until(self, t_s: float) -> None:
+        if self._trace is not None and self._trace.chains and self.has_pose:
+            self._course.carry(self.checkpoint, t_s, self._trace.chains[-1].steps)
 
     def _judge(self, fix: Fix) -> FixOutcome:
         complaint = complaint_about(fix)
@@ -97,6 +121,8 @@ class FixJudge:
         t = reckoner.seconds(fix.t_exposure_ns)
         if not len(history) or t < history.first_s:
             return self._refuse(fix, "before the first packet")
+        if not self.has_pose and t < self.unseen_until_s:
+            return self._refuse(fix, "before a pause in the packets")
         if t > reckoner.newest_s + 1e-9:
             if t > reckoner.newest_s + MAX_AHEAD_S:
                 return self._refuse(fix, "more than a second ahead of the packets")
@@ -125,7 +151,8 @@ class FixJudge:
         creeping = self._creep.variance_to_add(float(z[2]), float(S[2, 2]), t - self.checkpoint.t_s)
         P = fixed.checkpoint.P
         P[es.GYRO_BIAS, es.GYRO_BIAS] += creeping
-        self._reckoner.is_lost = False
+        if t >= self.unseen_until_s:
+            self._reckoner.is_lost = False
         if self._trace is not None and steps is not None:
             self._trace.chains[-1].steps += [*steps, Corrected(fixed.H, K, weight, z)]
         self._accept(fix, fixed.checkpoint, is_late=is_late)

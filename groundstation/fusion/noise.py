@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+GYRO_BIAS_WALK_RAD_S_RTS = 1.2e-5
+"""Of a warm sensor."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseModel:
@@ -37,7 +40,7 @@ class NoiseModel:
     gyro_bias_sigma_rad_s: float = 0.9
     """Before a rest: the null of the data sheet, +-50 deg/s."""
     acc_bias_sigma_m_s2: float = 0.15
-    gyro_bias_walk_rad_s_rts: float = 1.2e-5
+    gyro_bias_walk_rad_s_rts: float = GYRO_BIAS_WALK_RAD_S_RTS
     acc_bias_walk_m_s2_rts: float = 1.6e-5
     gyro_tempco_rad_s_c: float = 0.0
     """Slope of the gyro's null with temperature; a data sheet value is right to `tempco_sigma_ratio`."""
@@ -97,6 +100,27 @@ def packet_density(poll_sigma: float, lsb: float, poll_rate_hz: float) -> float:
         poll_rate_hz: polls per second, all of them averaged into packets.
     """
     return math.sqrt((poll_sigma**2 + lsb**2 / 12.0) / poll_rate_hz)
+
+
+STEADY_S = 10.0
+"""For about so long a vehicle turns at one rate to within a step of its gyro."""
+
+
+def rounding_walk(poll_sigma: float, lsb: float) -> float:
+    """Return the random walk that stands for what rounding does to means of polls, in the unit over sqrt(s).
+
+    Noise well above a step makes the mean of rounded polls true; below, the mean is off by up to
+    lsb / pi exp(-2 (pi sigma / lsb)^2), depending on where between two steps the rate lies (Widrow and
+    Kollar, Quantization Noise, 2008: the first harmonic). A rest teaches the null with that error, and each
+    other rate has another one.
+
+    Args:
+        poll_sigma: one sigma of one poll before quantisation.
+        lsb: quantisation step, in the same unit; 0 for none.
+    """
+    if lsb <= 0.0:
+        return 0.0
+    return lsb / math.pi * math.exp(-2.0 * (math.pi * poll_sigma / lsb) ** 2) / math.sqrt(STEADY_S)
 
 
 def lag_of_bandwidth(bandwidth_hz: float) -> float:

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from groundstation.core.library import default_core
 from groundstation.fusion import error_state as es
-from groundstation.fusion.backward_stamps import BackwardStamps
 from groundstation.fusion.estimator import Counters, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
 from groundstation.fusion.slope_grid import SlopeGrid
+from groundstation.fusion.stamp_doubt import AHEAD_PACKETS, BACKWARD_PACKETS, StampDoubt
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ STAMP_GAIN = 0.02
 """Share of a stamp's difference from the ticks that is followed; smooths the jitter of the stamps."""
 MAX_STAMP_JITTER_S = 0.02
 """A stamp that is further from its tick than this is not jitter: the clock or the sensor jumped."""
+MAX_AHEAD_S = 1.0
+"""A stamp further ahead of its tick is not acted on before the next ones go on from it."""
 LOOKUP_EVERY = 8
 """Packets between look-ups of the table's map; a vehicle moves millimetres meanwhile."""
 NOISE_SIGMAS = 6.0
@@ -64,15 +66,16 @@ class Reckoner:
         history: The packets so far.
         has_pose: Whether a state was loaded.
         origin_ns: Stamp of the internal seconds' origin, None before the first.
+        crossed_s: Length of the newest hole in the packets; whoever acts on it sets it back to 0.
 
     Raises:
         CoreError: there is no core.
     """
 
     __slots__ = (
-        "_add", "_asked", "_backward", "_counters", "_events", "_hole_row", "_is_stale", "_keep", "_lib",
-        "_map", "_read", "_row", "_slope", "_state", "_until_lookup", "_write", "has_pose", "history", "now",
-        "origin_ns",
+        "_add", "_asked", "_counters", "_doubt", "_events", "_hole_row", "_is_stale", "_keep", "_lib",
+        "_map", "_read", "_row", "_slope", "_state", "_until_lookup", "_write", "crossed_s", "has_pose",
+        "history", "now", "origin_ns",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
@@ -92,7 +95,8 @@ class Reckoner:
             ffi.buffer(ffi.addressof(now, name)) for name in ("asked", "state", "row", "hole_row")
         )
         self._counters = counters
-        self._backward = BackwardStamps()
+        self._doubt = StampDoubt()
+        self.crossed_s = 0.0
         self._map = table_map
         self._until_lookup = 0
         self._slope = (0.0, 0.0)
@@ -102,7 +106,7 @@ class Reckoner:
         self.history = PacketHistory()
         self._keep = self.history.rows.frombytes
         now.period_s = noise.packet_period_s
-        now.max_jitter_s, now.stamp_gain = MAX_STAMP_JITTER_S, STAMP_GAIN
+        now.max_jitter_s, now.stamp_gain, now.max_ahead_s = MAX_STAMP_JITTER_S, STAMP_GAIN, MAX_AHEAD_S
         now.gyro_lag_s, now.acc_lag_s = noise.gyro_lag_s, noise.acc_lag_s
         now.lag_difference_s = noise.gyro_lag_s - noise.acc_lag_s
         now.max_rate_step, now.max_force_step = largest_steps(noise)
@@ -160,7 +164,7 @@ class Reckoner:
         self._is_stale = True
 
     def add(self, packet: ImuPacket) -> bool:
-        """Take one packet; False when its stamp is not after the last one's."""
+        """Take one packet; False when its stamp is not after the last one's, or waits for a witness."""
         if self.origin_ns is None:
             self.start_clock(packet.t_ns - round(packet.dt_s * 1e9))
             self.now.is_restarted = True
@@ -170,8 +174,8 @@ class Reckoner:
             return False
         self._keep(self._row)
         self._is_stale = False
-        if self._backward.count:
-            self._backward.count = 0
+        if self._doubt.count:
+            self._doubt.count = 0
         if self._map is not None:
             self._until_lookup -= 1
             if self._until_lookup < 0:
@@ -185,20 +189,27 @@ class Reckoner:
             if not self._clock_restarted(t_ns):
                 return False
             flags = self._add(self.now)
+        elif flags & self._lib.AHEAD:
+            self._counters.add("packet_stamp_far_ahead_of_the_ticks")
+            if not self._doubt.is_followed(t_ns, AHEAD_PACKETS):
+                return False
+            self.now.is_restarted = True
+            flags = self._add(self.now)
         for flag, name in self._events:
             if flags & flag:
                 self._counters.add(name)
         if flags & self._lib.HOLE:
             self._keep(self._hole_row)
+            self.crossed_s = float(self.now.hole_row.span_s)
         return True
 
     def _clock_restarted(self, t_ns: int) -> bool:
         """Count a stamp that lies behind; many in a row are a clock that jumped back, and are followed."""
         self._counters.add("packet_stamp_not_after_the_last")
-        if not self._backward.is_restart(t_ns):
+        if not self._doubt.is_followed(t_ns, BACKWARD_PACKETS):
             return False
         now = self.now
-        missed = self._backward.count * now.period_s
+        missed = self._doubt.count * now.period_s
         self.origin_ns = now.origin_ns = t_ns - round((now.newest_s + missed) * 1e9)
         now.has_last = now.has_suspect = False
         now.is_restarted = True

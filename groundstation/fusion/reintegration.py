@@ -22,6 +22,8 @@ MAX_ACC_M_S2 = 0.5
 """Published anomaly gate."""
 MAX_RATE_RAD_S = math.radians(50.0)
 """Published anomaly gate."""
+LONGEST_HOLE_S = 2.0
+"""Longer without packets, and the pose is lost until the next fix; such a hole is not integrated."""
 FIT_STRETCH_S = 20.0
 """Flight over which the offsets are fitted, once."""
 
@@ -47,6 +49,7 @@ class ReintegrationEstimator:
         self._pose: list[float] | None = None  # theta, vx, vy, px, py of the IMU point
         self._pose_at_fix: list[float] = []  # the same at the exposure of the newest fix
         self._rate = 0.0
+        self._is_lost, self._unseen_until = False, -math.inf
         self._last = (0.0, 0.0, 0.0)
         self._waiting: list[Fix] = []
         self._accounts: list[FixOutcome] = []
@@ -90,7 +93,11 @@ class ReintegrationEstimator:
         if self._pose is None:
             return None
         if self._rest_from is None:
-            self._pose = self._integrate(self._pose, packet.dt_s, rate, ax, ay)
+            if packet.dt_s > LONGEST_HOLE_S:
+                self._is_lost, self._unseen_until = True, t
+                self.counters.add("packets_missing_for_long")
+            else:
+                self._pose = self._integrate(self._pose, packet.dt_s, rate, ax, ay)
             self._rate = rate - float(self._offsets[0])
         return self.state()
 
@@ -142,7 +149,7 @@ class ReintegrationEstimator:
             xy,
             xy,
             heading,
-            False,
+            self._is_lost,
         )
 
     def doubt_forces(self, t_ns: int, *, x: bool, y: bool) -> None:
@@ -195,6 +202,7 @@ class ReintegrationEstimator:
         velocity = (0.0, 0.0) if resting else self._finite_difference()
         self._pose_at_fix = [heading, *velocity, fix.x_m + lx, fix.y_m + ly]
         self._pose = self._carry(self._pose_at_fix, t, self._seconds(self._t_ns))
+        self._is_lost = self._is_lost and t < self._unseen_until
         if self._is_fitted:
             self._history.forget_before(t)
             self._fixes = self._fixes[-2:]

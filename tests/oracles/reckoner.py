@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.fusion import error_state as es
-from groundstation.fusion.backward_stamps import BackwardStamps
 from groundstation.fusion.estimator import Counters, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
-from groundstation.fusion.reckoner import LOOKUP_EVERY, MAX_STAMP_JITTER_S, STAMP_GAIN
+from groundstation.fusion.reckoner import LOOKUP_EVERY, MAX_AHEAD_S, MAX_STAMP_JITTER_S, STAMP_GAIN
 from groundstation.fusion.slope_grid import SlopeGrid
+from groundstation.fusion.stamp_doubt import AHEAD_PACKETS, BACKWARD_PACKETS, StampDoubt
 from oracles.packet_screen import PacketScreen
 
 Array = NDArray[np.float64]
@@ -29,12 +29,12 @@ class OracleReckoner:
     """
 
     __slots__ = (
-        "_acc_lag", "_ax", "_ay", "_backward", "_bax", "_bay", "_bg", "_counters",
+        "_acc_lag", "_ax", "_ay", "_bax", "_bay", "_bg", "_counters", "_doubt",
         "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
         "_mxx", "_mxy", "_myx", "_myy", "_period", "_px", "_py", "_rate_read", "_reference_c",
         "_rx", "_ry", "_screen", "_slope_x", "_slope_y", "_temperature_c", "_theta", "_until_lookup",
-        "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "has_pose", "history", "is_lost", "newest_ns",
-        "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
+        "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "crossed_s", "has_pose", "history", "is_lost",
+        "newest_ns", "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
@@ -48,6 +48,7 @@ class OracleReckoner:
         self.history = PacketHistory()
         self.origin_ns: int | None = None
         self.newest_ns = 0
+        self.crossed_s = 0.0
         self.newest_s = 0.0
         """End of the newest packet since the origin, smoothed."""
         self.rest_from_s, self.rest_to_s = math.inf, -math.inf
@@ -59,7 +60,7 @@ class OracleReckoner:
         self.rate_rad_s = 0.0
         self._rate_read = self._ax = self._ay = 0.0
         self._force_x = self._force_y = 0.0
-        self._backward = BackwardStamps()
+        self._doubt = StampDoubt()
         self._warmth = 0.0
         self._temperature_c = self._reference_c = math.nan
         self._theta = self._vx = self._vy = self._px = self._py = 0.0
@@ -89,8 +90,13 @@ class OracleReckoner:
         t_ns, dt, rate, ax, ay, temperature_c = packet
         if self.origin_ns is None:
             self.start_clock(t_ns - round(dt * 1e9))
-        elif t_ns <= self.newest_ns and not self._clock_restarted(t_ns):
-            return False
+        elif t_ns <= self.newest_ns:
+            if not self._clock_restarted(t_ns):
+                return False
+        elif self.history.rows and self.seconds(t_ns) - (self.newest_s + dt) > MAX_AHEAD_S:
+            self._counters.add("packet_stamp_far_ahead_of_the_ticks")
+            if not self._doubt.is_followed(t_ns, AHEAD_PACKETS):
+                return False
         if not self.history.rows:  # whatever came before the first packet is not a hole in the packets
             dt = self._period
             self.newest_s = (t_ns - self.origin_ns) * 1e-9 - dt  # type: ignore[operator]  # set above
@@ -103,7 +109,7 @@ class OracleReckoner:
             t += off
             dt = t - self.newest_s
         self.newest_ns, self.newest_s = t_ns, t
-        self._backward.count = 0
+        self._doubt.count = 0
         if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
             self._warm(temperature_c)
         hole = 0.0
@@ -112,7 +118,7 @@ class OracleReckoner:
             rate, ax, ay, hole = self._rate_read, self._ax, self._ay, 1.0
         if dt > 1.5 * self._period:
             self._counters.add("packet_hole")
-            gap = dt - self._period
+            self.crossed_s = gap = dt - self._period
             dt = self._period
             self._advance(
                 t - dt,
@@ -134,9 +140,9 @@ class OracleReckoner:
     def _clock_restarted(self, t_ns: int) -> bool:
         """Count a stamp that lies behind; many in a row are a clock that jumped back, and are followed."""
         self._counters.add("packet_stamp_not_after_the_last")
-        if not self._backward.is_restart(t_ns):
+        if not self._doubt.is_followed(t_ns, BACKWARD_PACKETS):
             return False
-        missed = self._backward.count * self._period
+        missed = self._doubt.count * self._period
         self.origin_ns = t_ns - round((self.newest_s + missed) * 1e9)
         self._counters.add("clock_jumped_back")
         self._screen.forget()

@@ -139,3 +139,32 @@ def test_ticks_are_recovered_from_jittering_stamps(windows, seed):
         k += n
         stamp = 0.01 * k + float(np.clip(rng.normal(0.0, 3e-4), -1e-3, 1e-3))
         assert ticks.elapsed_s(stamp) == pytest.approx(0.01 * n)
+
+
+@pytest.mark.parametrize("ahead_s", [10, 600, 100_000, 1_760_000_000])
+@pytest.mark.parametrize("wild", [1, 2])
+def test_stamps_far_ahead_of_the_ticks_are_not_acted_on(flying, ahead_s, wild, fix_covariance):
+    for t in range(3010, 3010 + 10 * wild, 10):
+        assert flying.add_imu(ImuPacket((t + 1000 * ahead_s) * MS, 0.01, 0.0, 0.0, 0.0, 25.0)) is None
+    assert flying.counters.by_name["packet_stamp_far_ahead_of_the_ticks"] == wild
+    state = flying.add_imu(ImuPacket((3010 + 10 * wild) * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    assert not state.is_lost
+    assert math.hypot(state.x_m, state.y_m) < 1e-3
+    assert flying.add_fix(Fix(3000 * MS, 3600 * MS, 0.0, 0.0, 0.0, fix_covariance)).used
+
+
+def test_a_clock_set_ahead_is_followed_when_three_packets_say_so_and_the_filter_is_lost(
+    flying, fix_covariance
+):
+    states = [
+        flying.add_imu(ImuPacket((63_000 + t) * MS, 0.01, 0.0, 0.0, 0.0, 25.0)) for t in range(10, 100, 10)
+    ]
+    assert states[:2] == [None, None]
+    assert all(state.is_lost for state in states[2:])
+    assert states[2].sigma_x_m > 10.0  # a minute at the speed of anything on a table
+    one = flying.add_fix(Fix(63_050 * MS, 63_090 * MS, 0.5, 0.0, 0.0, fix_covariance))
+    assert not one.used  # a second one must agree
+    assert flying.add_fix(Fix(63_080 * MS, 63_090 * MS, 0.5, 0.0, 0.0, fix_covariance)).used
+    found = flying.add_imu(ImuPacket(63_100 * MS, 0.01, 0.0, 0.0, 0.0, 25.0))
+    assert not found.is_lost
+    assert found.x_m == pytest.approx(0.5, abs=0.005)
