@@ -54,7 +54,7 @@ class ImuFrame(NamedTuple):
         gyro_counts: mean gyro code, offset binary, 2048 nominal at rest.
         tilt_counts: mean codes (chip x channel X, x.Y, y.X, y.Y), 1024 nominal; None in v1.
         tilt_difference_counts: X - Y of chip x and chip y, 0 nominal.
-        housekeeping: multiplexed item, None in v1.
+        housekeeping: multiplexed item; None in v1, and where no chip can have given the value.
         attention: v2: a sensor fault or self-test bit is set in the status word.
         end_offset: index of the frame's last byte in the chunk that completed it. Negative for a v1 frame
             that was held back from an earlier chunk until the lock was confirmed.

@@ -18,8 +18,9 @@ class ParserCounters:
         discontinuities: jumps of sequence or tick that loss does not explain (restart of the block).
         rejected_sync: v1: runs of bytes skipped in search of the sync byte.
         rejected_checksum: v1: candidates with a wrong 8-bit sum.
-        rejected_sequence: v1: candidates whose sequence number does not follow.
-        rejected_implausible: fields no sensor can give (both versions).
+        rejected_sequence: frames that came before; v1: also candidates whose sequence does not follow.
+        rejected_implausible: fields no sensor can give (both versions); of v2 also temperatures, without
+            which the frame is good.
         rejected_step: v1: gyro jump from frame to frame beyond the limit.
         rejected_length: v2: packet of a length that no type has.
         rejected_cobs: v2: broken byte stuffing.

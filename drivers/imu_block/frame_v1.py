@@ -11,15 +11,21 @@ limits of what the sensors can give.
 
 import math
 import struct
+from collections import deque
 
 from drivers.imu_block.block_frames import FIXED_POINT, GYRO_CODE_MAX, TILT_CODE_MAX, ImuFrame
 from drivers.imu_block.counters import ParserCounters
+from drivers.imu_block.step_limit import GYRO_STEP_COUNTS, StepLimit
 
 SYNC = 0xA5
 V1_WIRE_BYTES = 9
 FRAMES_TO_LOCK = 3
-GYRO_STEP_LIMIT_COUNTS = 600.0
-"""Largest believable gyro change between neighbouring frames: 146 deg/s, beyond self-test (221 counts)."""
+REPEATS_KNOWN = 8
+"""Of the last so many frames, one that comes again is known."""
+FIRST_SEQUENCES = 3
+"""A stream that goes on with one of these, without the bytes of what is missing, has begun again,"""
+SMALL_GAP = 16
+"""unless it is so little."""
 
 _SYNC_BYTES = bytes((SYNC,))
 _LAYOUT = struct.Struct(">BBHhhB")
@@ -78,8 +84,16 @@ class V1Parser:
         self._sample_count = sample_count
         self._buffer = b""
         self._last_sequence: int | None = None
-        self._last_gyro_fixed = 0
+        self._steps = StepLimit(GYRO_STEP_COUNTS * FIXED_POINT)
+        self._recent: deque[bytes] = deque(maxlen=REPEATS_KNOWN)
         self._skipped_bytes = 0
+
+    def begun_again(self, counters: ParserCounters) -> "V1Parser":
+        """A parser that knows nothing of the stream but what the last frame of this one was."""
+        parser = V1Parser(counters, self._sample_count)
+        parser._last_sequence = self._last_sequence
+        parser._skipped_bytes = self._skipped_bytes + len(self._buffer)
+        return parser
 
     def adopt(self, counters: ParserCounters) -> None:
         """Count into ``counters`` from now on."""
@@ -136,6 +150,11 @@ class V1Parser:
         if fields is None:
             self._skip(1)
             return 1
+        frame = data[position : position + V1_WIRE_BYTES]
+        if frame in self._recent:  # something on the way has sent it twice
+            self.counters.rejected_sequence += 1
+            self.counters.bytes_rejected += V1_WIRE_BYTES
+            return V1_WIRE_BYTES
         sequence, gyro, _, _ = fields
         assert self._last_sequence is not None
         missing = (sequence - self._last_sequence - 1) & 0xFF
@@ -147,9 +166,8 @@ class V1Parser:
             self.is_locked = False
             return 0
         self.counters.frames_lost += missing
-        step = abs(gyro - self._last_gyro_fixed)
-        self._remember(sequence, gyro)
-        if step > GYRO_STEP_LIMIT_COUNTS * FIXED_POINT:
+        self._remember(sequence, frame)
+        if self._steps.is_step(gyro):
             self.counters.rejected_step += 1
             self.counters.bytes_rejected += V1_WIRE_BYTES
         else:
@@ -169,19 +187,31 @@ class V1Parser:
                 self._skip(1)
                 return 1
             candidates.append(fields)
-        if self._last_sequence is not None:
-            missing = (candidates[0][0] - self._last_sequence - 1) & 0xFF
-            self.counters.frames_lost += missing
-            self.counters.discontinuities += missing > 0
+        self._account_for_gap(candidates[0][0])
+        self._steps = StepLimit(GYRO_STEP_COUNTS * FIXED_POINT)
         for index, fields in enumerate(candidates):
-            end = position + (index + 1) * V1_WIRE_BYTES - 1 - origin
-            frames.append(self._frame(fields, end))
-            self._remember(fields[0], fields[1])
+            start = position + index * V1_WIRE_BYTES
+            frames.append(self._frame(fields, start + V1_WIRE_BYTES - 1 - origin))
+            self._steps.is_step(fields[1])
+            self._remember(fields[0], data[start : start + V1_WIRE_BYTES])
         self.is_locked = True
         self.counters.locks += 1
         if self.lock_end_offset is None:
             self.lock_end_offset = frames[-1].end_offset
         return FRAMES_TO_LOCK * V1_WIRE_BYTES
+
+    def _account_for_gap(self, sequence: int) -> None:
+        """Count what is missing before a new lock: by sequence, and by the bytes that passed beyond 256."""
+        if self._last_sequence is None:
+            return
+        missing = (sequence - self._last_sequence - 1) & 0xFF
+        passed = self._skipped_bytes / V1_WIRE_BYTES
+        if sequence <= FIRST_SEQUENCES and missing > SMALL_GAP and passed < missing / 2:
+            self.counters.discontinuities += 1
+            return
+        missing += 256 * max(0, round((passed - missing) / 256))
+        self.counters.frames_lost += missing
+        self.counters.discontinuities += missing > 0
 
     def _peek(
         self, data: bytes, start: int, before: list[tuple[int, int, int, int]]
@@ -195,14 +225,14 @@ class V1Parser:
         if (fields[0] - before[-1][0]) & 0xFF != 1:
             self.counters.rejected_sequence += 1
             return None
-        if abs(fields[1] - before[-1][1]) > GYRO_STEP_LIMIT_COUNTS * FIXED_POINT:
+        if abs(fields[1] - before[-1][1]) > GYRO_STEP_COUNTS * FIXED_POINT:
             self.counters.rejected_step += 1
             return None
         return fields
 
-    def _remember(self, sequence: int, gyro_fixed: int) -> None:
+    def _remember(self, sequence: int, frame: bytes) -> None:
         self._last_sequence = sequence
-        self._last_gyro_fixed = gyro_fixed
+        self._recent.append(frame)
         self._skipped_bytes = 0
 
     def _frame(self, fields: tuple[int, int, int, int], end_offset: int) -> ImuFrame:

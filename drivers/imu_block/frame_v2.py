@@ -8,6 +8,7 @@
 """
 
 import struct
+from collections import deque
 from collections.abc import Iterable
 
 from drivers.imu_block.block_frames import (
@@ -46,7 +47,19 @@ _GYRO_FIXED_MAX = GYRO_CODE_MAX * FIXED_POINT
 _TILT_FIXED_MAX = TILT_CODE_MAX * FIXED_POINT
 _ITEMS = tuple(HousekeepingItem)
 _LOSS_LIMIT_TICKS = 5000
-"""A tick jump beyond 5 s is taken for a restart of the block, not for lost frames."""
+"""A tick jump beyond 5 s is taken for a restart of the block, unless the bytes of lost frames came."""
+_FIRST_WINDOWS = 4
+"""A tick of one of these, without the bytes of what is missing, is a restart, unless few are missing."""
+_SMALL_GAP = 16
+_TICK_MODULUS = 65536
+REPEATS_KNOWN = 8
+"""Of the last so many packets, one that comes again is known."""
+_HIGHEST_CODE = {
+    HousekeepingItem.TEMPERATURE_GYRO: GYRO_CODE_MAX,
+    HousekeepingItem.TEMPERATURE_TILT_X: 0xFF,
+    HousekeepingItem.TEMPERATURE_TILT_Y: 0xFF,
+    HousekeepingItem.STATUS: 0xFFFF,
+}
 
 
 def encode_v2(
@@ -113,6 +126,17 @@ class V2Parser:
         """Index, in the last chunk, of the last byte of its first good packet."""
         self._splitter = PacketSplitter(counters)
         self._last_tick: int | None = None
+        self._is_locked = False
+        self._recent: deque[bytes] = deque(maxlen=REPEATS_KNOWN)
+        self._bytes_before = 0  # in the chunks since the last sample, up to the present one
+        self._last_end = -1  # of that sample, in the present chunk
+
+    def begun_again(self, counters: ParserCounters) -> "V2Parser":
+        """A parser that knows nothing of the stream but what the last sample of this one was."""
+        parser = V2Parser(counters)
+        parser._last_tick = self._last_tick
+        parser._bytes_before = self._bytes_before
+        return parser
 
     def adopt(self, counters: ParserCounters) -> None:
         """Count into ``counters`` from now on."""
@@ -138,6 +162,8 @@ class V2Parser:
             if self.lock_end_offset is None:
                 self.lock_end_offset = end
             results.append(result)
+        self._bytes_before += len(chunk) - 1 - self._last_end
+        self._last_end = -1
         return results
 
     def _sample(self, packet: bytes, end: int) -> ImuFrame | None:
@@ -149,12 +175,20 @@ class V2Parser:
         if not count or gyro > _GYRO_FIXED_MAX or max(xx, xy, yx, yy) > _TILT_FIXED_MAX:
             counters.rejected_implausible += 1
             return None
-        if self._last_tick is None:
+        if packet in self._recent:  # something on the way has sent it twice
+            counters.rejected_sequence += 1
+            return None
+        self._recent.append(packet)
+        if not self._is_locked:
+            self._is_locked = True
             counters.locks += 1
-        else:
-            self._account(tick, count)
-        self._last_tick = tick
+        if self._last_tick is not None:
+            self._account(tick, count, self._bytes_before + end - self._last_end)
+        self._last_tick, self._bytes_before, self._last_end = tick, 0, end
         counters.frames_good += 1
+        item = _ITEMS[kind & 3]
+        is_possible = value <= _HIGHEST_CODE[item]
+        counters.rejected_implausible += not is_possible
         return ImuFrame(
             2,
             None,
@@ -163,20 +197,25 @@ class V2Parser:
             gyro / FIXED_POINT,
             (xx / FIXED_POINT, xy / FIXED_POINT, yx / FIXED_POINT, yy / FIXED_POINT),
             ((xx - xy) / FIXED_POINT, (yx - yy) / FIXED_POINT),
-            Housekeeping(_ITEMS[kind & 3], value),
+            Housekeeping(item, value) if is_possible else None,
             bool(kind & TYPE_ATTENTION),
             end,
         )
 
-    def _account(self, tick: int, count: int) -> None:
-        """Count what is missing between the last frame and this one."""
+    def _account(self, tick: int, count: int, passed_bytes: int) -> None:
+        """Count what is missing between the last frame and this one; bytes tell where ticks are ambiguous."""
         assert self._last_tick is not None
-        elapsed = (tick - self._last_tick) & 0xFFFF
-        if elapsed == count:
+        elapsed = (tick - self._last_tick) % _TICK_MODULUS
+        if elapsed == count and passed_bytes < _TICK_MODULUS:
             return
-        if not 0 < elapsed <= _LOSS_LIMIT_TICKS:
-            self.counters.discontinuities += 1
-        elif elapsed > count:
+        passed = passed_bytes / V2_WIRE_BYTES * count
+        elapsed += _TICK_MODULUS * max(0, round((passed - elapsed) / _TICK_MODULUS))
+        if passed < elapsed / 2:
+            is_first = tick <= _FIRST_WINDOWS * count and elapsed > _SMALL_GAP * count
+            if is_first or not 0 < elapsed <= _LOSS_LIMIT_TICKS:
+                self.counters.discontinuities += 1
+                return
+        if elapsed > count:
             self.counters.frames_lost += max(1, round((elapsed - count) / count))
 
     def _reply(self, packet: bytes) -> Reply | None:

@@ -6,103 +6,157 @@ whose slope is the drift. Of all lines below the cloud the one with the least me
 along the edge of the cloud's lower convex hull that spans the mean abscissa (Moon, Skelly and Towsley,
 "Estimation and removal of clock skew from network delay measurements", IEEE INFOCOM 1999).
 
-To bound the work, the cloud is thinned to the lowest point of each second; a minute of them is kept.
+To bound the work, each second is thinned to its own lower hull, which loses nothing; a minute is kept.
 """
 
 from collections import deque
 from itertools import pairwise
+from statistics import median
+from typing import NamedTuple
 
-BLOCK_NS = 1_000_000_000
-BLOCKS_KEPT = 60
-LAST_BLOCKS = 5
-DRIFT_LIMIT = 150e-6
-"""Crystals of block and host together: 2 x 50 ppm, and some room for temperature."""
+SECOND_NS = 1_000_000_000
+SECONDS_KEPT = 60
+DRIFT_LIMIT = 0.01
+"""Ceramic resonators are off by 0.5 %; beyond twice that a stream is not counted in milliseconds."""
 
-Point = tuple[float, float]
+_NEAR_NS = 50e3
+_FIRST_FIT_NS = 62_500_000
+_FITS_PER_SPAN = 8
+"""A fit is made anew when the data have become an eighth longer, once a second at the latest."""
+_RECENT_NS = 125_000_000
+_RECENT_KEPT = 4
+
+
+class Point(NamedTuple):
+    """One arrival.
+
+    Attributes:
+        x_ns: Departure by the sender's clock.
+        y_ns: Arrival minus departure.
+        span_ns: From the departure of the packet's first byte to that of its last; None if unknown.
+        pause_ns: From the departure of its last byte to that of the next one; None if unknown.
+    """
+
+    x_ns: float
+    y_ns: float
+    span_ns: float | None = None
+    pause_ns: float | None = None
 
 
 class LowerEnvelope:
-    """The line ``height(x) = offset + drift x`` under all recent points, abscissae in ns.
+    """The line ``height(x) = offset + drift x`` under all points of the last minute, abscissae in ns.
 
-    Cost: a comparison per point; once per second of abscissa one pass over at most 60 points.
+    Cost: a few comparisons per point; once per second of abscissa one pass over some hundred points.
+
+    Attributes:
+        points_seen: So far.
+        drift: Slope of the line, within ``DRIFT_LIMIT``.
+        scatter_ns: Median height of the seconds' lowest points over the line: a stall is no scatter.
+        span_ns, pause_ns: Medians of the points that carry the line, None while unknown.
     """
 
     def __init__(self) -> None:
         self.points_seen = 0
         self.drift = 0.0
+        self.scatter_ns = 0.0
+        self.span_ns: float | None = None
+        self.pause_ns: float | None = None
         self._offset_ns = float("inf")
-        self._blocks: deque[Point] = deque(maxlen=BLOCKS_KEPT)
-        self._block_end: float | None = None
-        self._lowest: Point = (0.0, float("inf"))
-        self._lowest_gap = float("inf")
-        self._mean_gap_ns = 0.0
-        self._lowest_of_last = 0.0
+        self._seconds: deque[list[Point]] = deque(maxlen=SECONDS_KEPT)
+        self._second_end_ns = -float("inf")
+        self._next_fit_ns = float("inf")
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_KEPT)
 
     @property
-    def blocks_closed(self) -> int:
-        """Seconds of data in the line, at most 60."""
-        return len(self._blocks)
-
-    @property
-    def scatter_ns(self) -> float:
-        """Mean height of the seconds' lowest points over the line."""
-        return self._mean_gap_ns
+    def length_ns(self) -> float:
+        """Abscissae from the oldest point that is kept to the newest."""
+        return self._seconds[-1][-1].x_ns - self._seconds[0][0].x_ns if self._seconds else 0.0
 
     def height_ns(self, x_ns: float) -> float:
         """Return the line's height at ``x_ns``; infinite before the first point."""
         return self._offset_ns + self.drift * x_ns
 
-    def floor_of_last_blocks_ns(self) -> float:
-        """Return how far the lowest of the last five seconds lies over the line (0 with fewer)."""
-        return self._lowest_of_last - self._offset_ns if len(self._blocks) >= LAST_BLOCKS else 0.0
+    @property
+    def recent_floor_ns(self) -> float:
+        """How far the lowest point of the last half second lay over the line when it came."""
+        return min((gap for _, gap in self._recent), default=0.0)
 
-    def add(self, x_ns: float, y_ns: float) -> None:
-        """Take one point; abscissae must not go back by more than a block."""
+    def gap_ns(self, x_ns: float, y_ns: float) -> float:
+        """Return how far a point lies over the line."""
+        return y_ns - self._offset_ns - self.drift * x_ns
+
+    def add(self, point: Point, *, is_backlog: bool = False) -> None:
+        """Take one point; abscissae must not go back.
+
+        Args:
+            point: The arrival.
+            is_backlog: It waited in a buffer of the host: that it is late means nothing.
+        """
         self.points_seen += 1
-        if self._block_end is None:
-            self._block_end = x_ns + BLOCK_NS
-        elif x_ns >= self._block_end:
-            self._close_block()
-            self._block_end = x_ns + BLOCK_NS
-        gap = y_ns - self._offset_ns - self.drift * x_ns
-        if gap < 0.0:
-            self._offset_ns = y_ns - self.drift * x_ns
-            self._lowest, self._lowest_gap = (x_ns, y_ns), 0.0
-        elif gap < self._lowest_gap:
-            self._lowest, self._lowest_gap = (x_ns, y_ns), gap
+        if point.x_ns >= self._second_end_ns:
+            self._seconds.append([])
+            self._second_end_ns = point.x_ns + SECOND_NS
+            if self.points_seen == 1:
+                self._next_fit_ns = point.x_ns + _FIRST_FIT_NS
+        _append_to_hull(self._seconds[-1], point)
+        gap_ns = self.gap_ns(point.x_ns, point.y_ns)
+        if gap_ns < 0.0:
+            self._offset_ns = point.y_ns - self.drift * point.x_ns
+            if gap_ns < -self.scatter_ns - _NEAR_NS:  # now it carries the line
+                self.span_ns, self.pause_ns = point.span_ns, point.pause_ns
+            gap_ns = 0.0
+        if not is_backlog:
+            self._note_recent(point.x_ns, gap_ns)
+        if point.x_ns >= self._next_fit_ns:
+            self._fit()
+            self._next_fit_ns = point.x_ns + min(SECOND_NS, self.length_ns / _FITS_PER_SPAN)
 
-    def _gap(self, point: Point) -> float:
-        return point[1] - self._offset_ns - self.drift * point[0]
+    def _note_recent(self, x_ns: float, gap_ns: float) -> None:
+        recent = self._recent
+        if recent and x_ns < recent[-1][0]:
+            if gap_ns < recent[-1][1]:
+                recent[-1] = recent[-1][0], gap_ns
+        else:
+            recent.append((x_ns + _RECENT_NS, gap_ns))
 
-    def _close_block(self) -> None:
-        if self._lowest_gap < float("inf"):
-            self._blocks.append(self._lowest)
-        self._lowest_gap = float("inf")
-        if not self._blocks:
+    def _fit(self) -> None:
+        hull: list[Point] = []
+        for second in self._seconds:
+            for point in second:
+                _append_to_hull(hull, point)
+        self.drift = _slope_over_the_middle(hull)
+        self._offset_ns = min(point.y_ns - self.drift * point.x_ns for point in hull)
+        lowest = [
+            min(((self.gap_ns(at.x_ns, at.y_ns), at) for at in second), key=lambda row: row[0])
+            for second in self._seconds
+        ]
+        self.scatter_ns = median(gap_ns for gap_ns, _ in lowest)
+        near = [point for gap_ns, point in lowest if gap_ns <= self.scatter_ns + _NEAR_NS]
+        spans = [point.span_ns for point in near if point.span_ns is not None]
+        pauses = [point.pause_ns for point in near if point.pause_ns is not None]
+        self.span_ns = median(spans) if spans else None
+        self.pause_ns = median(pauses) if pauses else None
+
+
+def _append_to_hull(hull: list[Point], point: Point) -> None:
+    """Add a point that lies not left of the others to their lower convex hull."""
+    if hull and hull[-1].x_ns == point.x_ns:
+        if hull[-1].y_ns <= point.y_ns:
             return
-        points = list(self._blocks)
-        self.drift = _drift(points)
-        heights = [y - self.drift * x for x, y in points]
-        self._offset_ns = min(heights)
-        self._lowest_of_last = min(heights[-LAST_BLOCKS:])
-        self._mean_gap_ns = sum(map(self._gap, points)) / len(points)
+        hull.pop()
+    while len(hull) > 1 and _turns_clockwise(hull[-2], hull[-1], point):
+        hull.pop()
+    hull.append(point)
 
 
-def _drift(points: list[Point]) -> float:
-    """Return the slope of the lower hull's edge over the mean abscissa, within the drift limit."""
-    if len(points) < 2:
-        return 0.0
-    hull: list[Point] = []
-    for point in points:
-        while len(hull) > 1 and _turns_clockwise(hull[-2], hull[-1], point):
-            hull.pop()
-        hull.append(point)
-    middle = sum(x for x, _ in points) / len(points)
-    for (x0, y0), (x1, y1) in pairwise(hull):
-        if x1 >= middle:
-            return max(-DRIFT_LIMIT, min(DRIFT_LIMIT, (y1 - y0) / (x1 - x0)))
+def _slope_over_the_middle(hull: list[Point]) -> float:
+    """Return the slope of the hull's edge over the middle of the abscissae, within the drift limit."""
+    middle_ns = (hull[0].x_ns + hull[-1].x_ns) / 2
+    for a, b in pairwise(hull):
+        if b.x_ns >= middle_ns:
+            return max(-DRIFT_LIMIT, min(DRIFT_LIMIT, (b.y_ns - a.y_ns) / (b.x_ns - a.x_ns)))
     return 0.0
 
 
 def _turns_clockwise(a: Point, b: Point, c: Point) -> bool:
-    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])
+    return (b.x_ns - a.x_ns) * (c.y_ns - a.y_ns) <= (b.y_ns - a.y_ns) * (c.x_ns - a.x_ns)

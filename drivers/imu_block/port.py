@@ -14,8 +14,10 @@ from typing import Self
 import serial
 
 from drivers.errors import LinkLost, NotFound, Refused
+from drivers.socket_url import check_socket_url
 
 READ_BYTES = 4096
+USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 
 
 class SerialPort:
@@ -27,7 +29,7 @@ class SerialPort:
 
     Raises:
         NotFound: if nothing is there.
-        Refused: if it is in use, forbidden, or does not take the bit rate.
+        Refused: if it is in use, forbidden, or does not take the bit rate; a socket without a port.
     """
 
     def __init__(self, url: str, baud: int = 250_000) -> None:
@@ -40,6 +42,8 @@ class SerialPort:
         except OSError:  # loop:// and the like have no descriptor
             self._fd = None
         self.is_low_latency = _ask_for_low_latency(self._port)
+        self.latency_timer_s = _latency_timer_s(url)
+        """The FTDI latency timer as the kernel reports it, None where there is no such thing."""
         with contextlib.suppress(OSError, serial.SerialException):
             self._port.reset_input_buffer()  # what waited before we came would look like late arrivals
 
@@ -48,15 +52,6 @@ class SerialPort:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    @property
-    def latency_timer_s(self) -> float | None:
-        """The FTDI latency timer as the kernel tells it, None where there is no such thing."""
-        path = Path("/sys/bus/usb-serial/devices") / Path(self.url).resolve().name / "latency_timer"
-        try:
-            return int(path.read_text()) * 1e-3
-        except (OSError, ValueError):
-            return None
 
     def read_chunk(self, timeout_s: float) -> tuple[int, bytes]:
         """Wait for bytes and return all that are there.
@@ -112,8 +107,17 @@ class SerialPort:
         os.close(self._wake_write)
 
 
+def _latency_timer_s(url: str) -> float | None:
+    path = USB_SERIAL / Path(url).resolve().name / "latency_timer"
+    try:
+        return int(path.read_text(encoding="ascii")) * 1e-3
+    except (OSError, ValueError):
+        return None
+
+
 def _open(url: str, baud: int) -> serial.Serial:
     """Open the port, or say in one sentence why not."""
+    check_socket_url(url)
     if url.startswith("/") and not Path(url).exists():
         raise NotFound(f"there is no serial port {url}")
     try:

@@ -152,8 +152,8 @@ class FrameParser:
 
     def _start_detection(self) -> None:
         self.detected_version = None
-        self._v1 = V1Parser(ParserCounters(), self._v1_sample_count)
-        self._v2 = V2Parser(ParserCounters())
+        self._v1 = self._v1.begun_again(ParserCounters())
+        self._v2 = self._v2.begun_again(ParserCounters())
         self.counters.bytes_undetected = 0
 
     def _detect(self, piece: bytes) -> list[ImuFrame | Reply]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from drivers.imu_block.block_frames import HousekeepingItem, ImuFrame, Status
+from drivers.imu_block.step_limit import GYRO_STEP_COUNTS, StepLimit
 
 STANDARD_GRAVITY_M_S2 = 9.80665  # by definition, CGPM 1901
 
@@ -34,7 +35,6 @@ TILT_TEMPERATURE_NULL_COUNTS = 197.0  # S, at 0 degC
 TILT_TEMPERATURE_SCALE_COUNTS_K = -1.083  # S
 
 GYRO_STUCK_POLLS = 500  # D: with 0.4 counts rms per poll, the least noise published, chance is below 1e-40
-GYRO_STEP_COUNTS = 600.0  # D: 146 deg/s between neighbouring frames; self-test is 221 counts
 
 
 def rate_rad_s(gyro_counts: float, null_counts: float = GYRO_NULL_COUNTS) -> float:
@@ -78,6 +78,8 @@ class SensorFault(IntFlag):
     """Not a fault, but the readings are not motion."""
     GYRO_STUCK = 0x400
     """The gyro's code has not changed for half a second: noise alone would have moved it."""
+    ATTENTION = 0x800
+    """The block draws attention to something, and has not stated what since."""
 
 
 class Reading(IntFlag):
@@ -97,10 +99,10 @@ _Y_FAULTS = SensorFault.TILT_Y_WINDOW | SensorFault.TILT_Y_SUM | SensorFault.REP
 
 
 def usable_readings(faults: SensorFault) -> Reading:
-    """Return the readings that a set of faults leaves usable; a self-test leaves none."""
+    """Return the readings that a set of faults leaves usable; a self-test, or what is not known, none."""
     if not faults:
         return ALL_READINGS
-    if faults & SensorFault.SELF_TEST:
+    if faults & (SensorFault.SELF_TEST | SensorFault.ATTENTION):
         return Reading(0)
     usable = ALL_READINGS
     pairs = ((_RATE_FAULTS, Reading.RATE), (_X_FAULTS, Reading.FORCE_X), (_Y_FAULTS, Reading.FORCE_Y))
@@ -124,17 +126,19 @@ class Plausibility:
         self._last_off = 0
         self._last_gyro_counts: float | None = None
         self._still_polls = 0
+        self._steps = StepLimit(GYRO_STEP_COUNTS)
+        self._is_explained = False
 
     def update(self, frame: ImuFrame, status: Status = _NO_STATUS) -> SensorFault:
         """Return the faults that hold with this frame.
 
         Args:
             frame: the next frame of one stream.
-            status: latest status word of the block (see ``Environment``); none for v1.
+            status: latest status word of the block, this frame's included (see ``Environment``); none for v1.
         """
         off = _tilts_off(frame)
         gyro, last = frame.gyro_counts, self._last_gyro_counts
-        if last is not None and abs(gyro - last) > GYRO_STEP_COUNTS:
+        if self._steps.is_step(gyro):
             off |= SensorFault.GYRO_STEP.value
         self._still_polls = self._still_polls + frame.sample_count if gyro == last else 0
         if self._still_polls >= GYRO_STUCK_POLLS:
@@ -142,11 +146,20 @@ class Plausibility:
         self._last_gyro_counts = gyro
         if abs(gyro - GYRO_NULL_COUNTS) > GYRO_RANGE_COUNTS:
             off |= SensorFault.GYRO_RANGE.value
-        if int(status) & _REPORTED_BITS:
-            off |= _reported(status)
+        off |= self._reported(frame, status)
         faults = off & (self._last_off | ~_LASTING)
         self._last_off = off
         return SensorFault(faults) if faults else _NO_FAULT
+
+    def _reported(self, frame: ImuFrame, status: Status) -> int:
+        """What the block states: attention in every frame, its reason in every fourth."""
+        reported = _reported(status) if int(status) & _REPORTED_BITS else 0
+        if not frame.attention:
+            self._is_explained = False
+            return reported
+        if frame.housekeeping is not None and frame.housekeeping.item == HousekeepingItem.STATUS:
+            self._is_explained = bool(reported)
+        return reported if self._is_explained else reported | SensorFault.ATTENTION.value
 
 
 def _tilts_off(frame: ImuFrame) -> int:

@@ -120,7 +120,7 @@ class ValveStatus:
     node_faults: int = 0
     """Bits of NodeFault."""
     rejected_commands: int = 0
-    """Commands refused (repeated counter, disarmed), modulo 256."""
+    """Commands with a repeated counter, modulo 256."""
     is_stop_pending: bool = False
     """A stop was received and its grace still runs."""
     is_landed_by_silence: bool = False

@@ -36,8 +36,8 @@ class ImuConfig(Settings):
     ftdi_latency_ms: Annotated[int, Field(ge=1, le=255)] = 16
     host_jitter_s: NonNegative = 0.0001
     """Mean of the exponentially distributed time a packet waits for the host."""
-    clock_ppm: Annotated[float, Field(ge=-500.0, le=500.0)] | None = None
-    """The crystal runs fast by this much; drawn within 50 ppm if absent."""
+    clock_ppm: Annotated[float, Field(ge=-9000.0, le=9000.0)] | None = None
+    """The crystal (5000: a ceramic resonator) runs fast by this much; drawn within 50 ppm if absent."""
     position_body_m: Pair = (0.03151, -0.02122)
     serial_number: Annotated[int, Field(ge=0, le=65535)] | None = None
     """Default 1 + the vehicle's index."""

@@ -76,7 +76,7 @@ class ValveNode:
         # Fifty times a second, and nearly always one of the sixteen counters with nothing else new.
         self._encode_status: Callable[[ValveStatus], CanFrame] = lru_cache(256)(encode)
         self._off_ns: dict[int, int] = {}  # energised valves and when their time is up
-        self._dead_man_ns = FAR_FUTURE_NS
+        self._dead_man_ns = start_ns + _SILENCE_NS  # from power-up, as if a command had been accepted then
         self._landing = LandingRules(start_ns)
         # Nodes do not power up at the same moment: their cycles are spread over the bus.
         self._status_ns = start_ns + STATUS_NS + index * 1_300_000
@@ -150,7 +150,6 @@ class ValveNode:
         if self._landing.must_land(now_ns, is_up=self._is_armed or self._is_air_on):
             self._close(list(self._off_ns), now_ns)
             self._is_armed = False
-            self._dead_man_ns = FAR_FUTURE_NS
             self._switch_air(now_ns, is_on=False)
 
     def _switch_air(self, now_ns: int, *, is_on: bool) -> None:
@@ -159,17 +158,14 @@ class ValveNode:
         self._is_air_on = is_on
 
     def _arm(self, is_armed: bool, now_ns: int) -> None:
-        if is_armed and not self._is_armed:
-            self._last_pulse_id = self._last_counter = None
         if not is_armed:
             self._close(list(self._off_ns), now_ns)
-            self._dead_man_ns = FAR_FUTURE_NS
-        self._is_armed, self._is_dead_man_closed = is_armed, False
+        self._is_armed = is_armed
         self._landing.arm()
 
     def _command(self, command: ValveCommand, now_ns: int) -> None:
         self._landing.command(now_ns, command.counter)
-        if not self._is_armed or command.counter == self._last_counter:
+        if command.counter == self._last_counter:
             self._rejected += 1
             return
         self._last_counter = command.counter
@@ -178,6 +174,8 @@ class ValveNode:
         if command.pulse_id == self._last_pulse_id:
             return
         self._last_pulse_id = command.pulse_id
+        if not self._is_armed:
+            return
         for valve, on_ms in enumerate(command.on_times_ms):
             if valve in self._off_ns:
                 self._off_ns[valve] = now_ns + on_ms * _MS

@@ -46,7 +46,9 @@ class LiveLaboratory:
         scenario = Scenario(read_config(config), seed)
         try:
             self._cameras = self._start_cameras(scenario)
-            # Switched on last: a second spent starting the cameras would come as a burst of bytes.
+            # Switched on last: a second spent starting the cameras, or here, would come as a burst of bytes,
+            # too many for a port that nobody reads yet.
+            gc.collect()
             start_ns = time.monotonic_ns()
             self._laboratory = EmulatedLaboratory(config, seed, start_ns=start_ns, is_rendering=False)
             for row in self._laboratory.installed:
@@ -74,7 +76,6 @@ class LiveLaboratory:
     def run(self) -> None:
         """Serve until stopped."""
         laboratory, selector = self._laboratory, self._selector
-        gc.collect()
         gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds
         try:
             while not self._is_stopping:

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeV
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from drivers.errors import Refused
+from drivers.socket_url import check_socket_url
 from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.declarations.names import PATTERN
 from groundstation.declarations.rig_file import RigFile
@@ -211,10 +213,14 @@ class Rig(Section):
 
 
 def check_address(rig: Rig, key: str, address: str | None) -> None:
-    """Refuse a ``laboratory:`` address in a rig without a laboratory.
+    """Refuse a ``laboratory:`` address in a rig without a laboratory, and a socket's without a port.
 
     Raises:
         ValueError: It begins with the key.
     """
     if address is not None and address.startswith(LABORATORY) and rig.laboratory is None:
         raise ValueError(f"{key}: {address!r} needs a [laboratory] section")
+    try:
+        check_socket_url(address or "")
+    except Refused as error:
+        raise ValueError(f"{key}: {error}") from error

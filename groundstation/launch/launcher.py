@@ -138,8 +138,7 @@ class Launcher:
         for child in self.children:
             for line in child.complaints():
                 self._say(f"{child.name}: {line}")
-            if child.has_refused:
-                raise RigError(child.last_words.removeprefix("groundstation: "))
+            _raise_refusal(child)
         now_s = time.monotonic()
         self._time.step(now_s)
         if self._fork_server.keep():
@@ -163,6 +162,7 @@ class Launcher:
                     child.restarts += 1
                     self._start(child)
         elif laboratory.has_ended:
+            _raise_refusal(laboratory)
             if self._addresses is None and not laboratory.restarts:
                 raise GroundStationError(f"the laboratory {laboratory.how_it_ended()}")
             self._addresses = None
@@ -214,6 +214,7 @@ class Launcher:
                 child.restarts += 1
                 self._start(child)
         elif child.has_ended:
+            _raise_refusal(child)
             how = child.how_it_ended()
             if child.restarts >= HOPELESS and not child.has_been_ready:
                 raise GroundStationError(
@@ -287,6 +288,16 @@ class Launcher:
         self._memory.release()
         if self.bus is not None:
             self.bus.close()
+
+
+def _raise_refusal(child: Child) -> None:
+    """Raise what a child refuses, wherever its end is noticed: it may end between two looks.
+
+    Raises:
+        RigError: It refuses what the rig states.
+    """
+    if child.has_refused:
+        raise RigError(child.last_words.removeprefix("groundstation: "))
 
 
 def _open_hub() -> tuple[str, ZenohBus]:

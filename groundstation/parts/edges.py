@@ -22,21 +22,21 @@ class ByteEdge(Edge):
     def __init__(self, url: str, baud: int) -> None:
         from drivers.imu_block.port import SerialPort
 
-        self._port = SerialPort(url, baud)
+        self.port = SerialPort(url, baud)
 
     def read(self) -> Iterable[tuple[int, object]]:
-        stamp_ns, data = self._port.read_chunk(READ_TIMEOUT_S)
+        stamp_ns, data = self.port.read_chunk(READ_TIMEOUT_S)
         return ((stamp_ns, data),) if data else ()
 
     def write(self, data: object) -> None:
         assert isinstance(data, bytes)
-        self._port.write(data)
+        self.port.write(data)
 
     def wake(self) -> None:
-        self._port.wake()
+        self.port.wake()
 
     def close(self) -> None:
-        self._port.close()
+        self.port.close()
 
 
 class CameraEdge(Edge):

@@ -23,6 +23,8 @@ DIAGNOSTICS_EVERY = 2
 TICK_S = 1e-3
 WORST_STAMP_S = 0.25
 """No link delays so unevenly: stamps this vague mean that the rig's averaging is not the block's."""
+STRANGE_DRIFT = 250e-6
+"""Beyond what two crystals are apart; turns that are integrated by such ticks are off by as much."""
 OK, WARNING = 0, 1
 VERSIONS = {"auto": None, "v1": 1, "v2": 2}
 _NO_TILTS: tuple[float, ...] = ()
@@ -35,7 +37,7 @@ class ImuReader(Node):
         vehicle: Its name.
         version: ``auto``, ``v1`` or ``v2``.
         baud: Of the line.
-        latency_timer_s: Of the USB adapter.
+        latency_timer_s: Of the USB adapter, where its driver does not report it.
         averaging: Polls per frame. Version 2 states its own and is asked for this one if it differs;
             version 1 does not state it, so this is what it is taken to have.
         serial_number: Of the block that belongs here, None if any may; version 1 cannot be asked.
@@ -78,6 +80,8 @@ class ImuReader(Node):
                 frames.append(each)
             elif isinstance(each, Identity):
                 self._found_number = each.serial_number
+        if not math.isnan(message.latency_timer_s):
+            self._clock.measured_timer(message.latency_timer_s)
         stamps = self._clock.update(message.stamp_ns, len(message.data), frames)
         for frame, stamp in zip(frames, stamps, strict=True):
             self._environment.update(frame)
@@ -99,9 +103,19 @@ class ImuReader(Node):
     def _diagnostics(self, now_ns: int) -> Diagnostics:
         counters = self._parser.counters.as_dict()
         keys, values = tuple(counters), tuple(str(count) for count in counters.values())
-        level = WARNING if self._complaint else OK
-        summary = f"{self.vehicle}/imu: samples are not believed: {self._complaint}" if level else ""
+        complaint = (
+            f"samples are not believed: {self._complaint}" if self._complaint else self._strange_clock()
+        )
+        level = WARNING if complaint else OK
+        summary = f"{self.vehicle}/imu: {complaint}" if complaint else ""
         return Diagnostics(now_ns, self.vehicle, f"{self.vehicle}/imu_reader", level, summary, keys, values)
+
+    def _strange_clock(self) -> str:
+        """In words, where the block's clock is certainly further off than any crystal; empty otherwise."""
+        drift = self._clock.drift_ratio
+        if abs(drift) - 3 * self._clock.drift_sigma < STRANGE_DRIFT:
+            return ""
+        return f"the block's clock is {100 * abs(drift):.2f} % {'slow' if drift > 0 else 'fast'}"
 
     def _raw(self, frame: ImuFrame, stamp: TickStamp) -> ImuRaw:
         return ImuRaw(

@@ -1,5 +1,6 @@
 """What the IMU block states, from bytes to calibrated samples."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,11 +23,17 @@ from groundstation.declarations.topic import Rank, Topic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImuBytes(Message):
-    """A read of the IMU block's serial port; the stamp is the arrival of its last byte."""
+    """A read of the IMU block's serial port; the stamp is the arrival of its last byte.
+
+    Attributes:
+        data: The bytes.
+        latency_timer_s: So long the adapter holds a byte back, as its driver reports; NaN if unknown.
+    """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuBytes"
     TOPIC: ClassVar = Topic("imu_bytes", 100, Rank.SENSOR)
     data: Bytes
+    latency_timer_s: F64 = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

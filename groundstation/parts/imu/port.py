@@ -1,11 +1,29 @@
 """The serial line of an IMU block."""
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Edge, Port
 from groundstation.parts.edges import ByteEdge
 from groundstation.parts.imu.messages import ImuBytes, ImuOrder
+
+
+class _Read(NamedTuple):
+    data: bytes
+    latency_timer_s: float
+
+
+class _ImuEdge(ByteEdge):
+    """A serial line whose driver may know the adapter's timer."""
+
+    def read(self) -> Iterable[tuple[int, object]]:
+        timer_s = self.port.latency_timer_s
+        for stamp_ns, data in super().read():
+            assert isinstance(data, bytes)
+            yield stamp_ns, _Read(data, math.nan if timer_s is None else timer_s)
 
 
 @dataclass(frozen=True)
@@ -17,6 +35,8 @@ class ImuPort(Port):
     baud: int
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
+        if isinstance(data, _Read):
+            return ImuBytes(stamp_ns, self.vehicle, data.data, data.latency_timer_s)
         assert isinstance(data, bytes)
         return ImuBytes(stamp_ns, self.vehicle, data)
 
@@ -28,4 +48,4 @@ class ImuPort(Port):
         return payload.data
 
     def open(self) -> Edge:
-        return ByteEdge(str(self.address), self.baud)
+        return _ImuEdge(str(self.address), self.baud)

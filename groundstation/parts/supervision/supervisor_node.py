@@ -106,7 +106,7 @@ class SupervisorNode(Node):
                 self._count_fixes(message)
             case ValveStatus():
                 sightings.node = NodeSeen(
-                    now_ns,
+                    min(now_ns, message.stamp_ns),
                     message.armed,
                     message.floating,
                     message.dead_man,

@@ -77,12 +77,18 @@ class ValveCommand(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CanIn(Message):
-    """A CAN frame that arrived from the valve bus."""
+    """A CAN frame that arrived from the valve bus.
+
+    Attributes:
+        arbitration_id, data: Of the frame.
+        passed: Frames that the bus carried since the one before, those that nobody here wants included.
+    """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/CanIn"
     TOPIC: ClassVar = Topic("can_in", 100, Rank.VALVES, scope=Scope.RIG)
     arbitration_id: U32
     data: Bytes
+    passed: U32 = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

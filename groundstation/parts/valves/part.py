@@ -81,6 +81,7 @@ def _check(rig: Rig) -> None:
         if interface not in can.VALID_INTERFACES:
             known = ", ".join(sorted(can.VALID_INTERFACES))
             raise ValueError(f"valve_bus.interface: {interface!r} is none of python-can's: {known}")
+        check_address(rig, "valve_bus.channel", str(bus["channel"]))
     owners: dict[int, str] = {}
     for name in rig.vehicles:
         index = rig.vehicle(name, ValvesOfVehicle).bus_index

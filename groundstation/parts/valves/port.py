@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from drivers.laboratory import CanFrame
+from drivers.valve_bus.frame import BusArrival
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import READ_TIMEOUT_S, Edge, Port
 from groundstation.parts.valves.messages import CanIn, CanOut
@@ -16,8 +17,7 @@ class _CanEdge(Edge):
         self._bus = ValveBusPort(config)
 
     def read(self) -> Iterable[tuple[int, object]]:
-        found = self._bus.read(READ_TIMEOUT_S)
-        return () if found is None else (found,)
+        return [(arrival.stamp_ns, arrival) for arrival in self._bus.read_newest(READ_TIMEOUT_S)]
 
     def write(self, data: object) -> None:
         assert isinstance(data, CanFrame)
@@ -36,6 +36,8 @@ class ValveBus(Port):
     vehicles: tuple[str, ...]
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
+        if isinstance(data, BusArrival):
+            return CanIn(stamp_ns, "", data.frame.arbitration_id, data.frame.data, data.passed)
         assert isinstance(data, CanFrame)
         return CanIn(stamp_ns, "", data.arbitration_id, data.data)
 

@@ -66,7 +66,7 @@ class ValveWriter(Node):
         yield self._frame(command, now_ns)
 
     def _received(self, message: CanIn, now_ns: int) -> Iterator[Message]:
-        self._frames += 1
+        self._frames += message.passed
         if now_ns - self._counted_ns >= COUNTED_NS:
             self._bus_rate_hz = self._frames * 1e9 / (now_ns - self._counted_ns)
             self._frames, self._counted_ns = 0, now_ns
@@ -82,7 +82,7 @@ class ValveWriter(Node):
             case bus.ValveStatus() if reported.vehicle == self._index:
                 self._floating = reported.is_float_air_on
                 yield ValveStatus(
-                    now_ns,
+                    message.stamp_ns,  # of its arrival: it may have waited
                     self.vehicle,
                     reported.open_mask,
                     reported.executed_counter,

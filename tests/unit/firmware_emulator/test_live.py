@@ -46,8 +46,10 @@ def test_an_imu_driver_reads_a_live_block_and_is_answered(serving):
     with serving({"vehicles": [FAST]}) as addresses, SerialPort(str(addresses["alpha/imu"])) as port:
         parser = FrameParser(2)
         frames = [item for item in frames_of(port, parser, 20) if isinstance(item, ImuFrame)]
-        steps = {(b.tick_ms - a.tick_ms) & 0xFFFF for a, b in pairwise(frames)}
-        assert steps == {10}
+        steps = [(b.tick_ms - a.tick_ms) & 0xFFFF for a, b in pairwise(frames)]
+        # a port that is read late, on a busy machine, loses whole frames: the driver knows how many
+        assert sum(step // 10 - 1 for step in steps) == parser.counters.frames_lost
+        assert {step % 10 for step in steps} == {0}
         port.write(encode_identify(7))
         answer = None
         while answer is None:  # however many samples already wait in the port

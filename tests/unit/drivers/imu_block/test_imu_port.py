@@ -134,6 +134,23 @@ def test_a_port_that_is_not_there_is_named():
         SerialPort("socket://127.0.0.1:1")
 
 
+@pytest.mark.parametrize(
+    "url", ["socket://host", "socket://", "socket://:5", "socket://host:x", "socket://h:70000"]
+)
+def test_a_socket_without_a_port_is_refused_in_a_sentence(url):
+    with pytest.raises(Refused, match=r"^socket://.* is no address of a socket: expected socket://HOST:PORT"):
+        SerialPort(url)
+
+
+def test_the_timer_is_what_the_kernel_reports(line, tmp_path, monkeypatch):
+    folder = tmp_path / Path(line[1]).name
+    folder.mkdir()
+    (folder / "latency_timer").write_text("1\n")
+    monkeypatch.setattr("drivers.imu_block.port.USB_SERIAL", tmp_path)
+    with SerialPort(line[1]) as port:
+        assert port.latency_timer_s == 0.001
+
+
 def test_a_file_is_no_serial_port(tmp_path):
     path = tmp_path / "not_a_port"
     path.write_bytes(b"")

@@ -26,10 +26,11 @@ from drivers.imu_block.sensors import (
 )
 
 
-def frame(gyro=2048.0, tilts=(1024.0, 1024.0, 1024.0, 1024.0), item=0, value=2048):
+def frame(gyro=2048.0, tilts=(1024.0, 1024.0, 1024.0, 1024.0), item=0, value=2048, attention=False):
     wire = encode_v2(
-        tick_ms=1, sample_count=1, gyro_counts=gyro, tilt_counts=tilts, housekeeping=Housekeeping(item, value)
-    )
+        tick_ms=1, sample_count=1, gyro_counts=gyro, tilt_counts=tilts,
+        housekeeping=Housekeeping(item, value), attention=attention,
+    )  # fmt: skip
     return FrameParser(2).feed(wire)[0]
 
 
@@ -125,7 +126,7 @@ def test_a_gyro_code_that_never_moves_for_half_a_second_is_stuck_until_it_moves(
 @pytest.mark.parametrize("fault", list(SensorFault))
 def test_a_fault_costs_its_own_reading_and_a_self_test_all(fault):
     left = usable_readings(fault)
-    if fault is SensorFault.SELF_TEST:
+    if fault in (SensorFault.SELF_TEST, SensorFault.ATTENTION):
         assert left == Reading(0)
     else:
         lost = ALL_READINGS & ~left
@@ -133,3 +134,49 @@ def test_a_fault_costs_its_own_reading_and_a_self_test_all(fault):
         assert names[lost] in fault.name
     assert usable_readings(SensorFault(0)) == ALL_READINGS
     assert usable_readings(SensorFault.TILT_X_SUM | SensorFault.TILT_Y_SUM) == Reading.RATE
+
+
+def usable_in(watch, environment, frames):
+    """What each frame leaves usable, told as the reader tells it."""
+    left = []
+    for each in frames:
+        environment.update(each)
+        left.append(usable_readings(watch.update(each, environment.status)))
+    return left
+
+
+@pytest.mark.parametrize("before", [0, 1, 2, 3])
+@pytest.mark.parametrize(
+    ("bit", "left"),
+    [
+        (Status.SELF_TEST, Reading(0)),
+        (Status.FAULT_GYRO, Reading.FORCE_X | Reading.FORCE_Y),
+        (Status.FAULT_TILT_X, Reading.RATE | Reading.FORCE_Y),
+        (Status.FAULT_TILT_Y, Reading.RATE | Reading.FORCE_X),
+    ],
+)
+def test_attention_leaves_nothing_until_the_status_says_what_it_is(bit, left, before):
+    watch, environment = Plausibility(), Environment()
+    calm = [frame(item=item, value=0 if item == 3 else 170, gyro=2048 + item) for item in range(4)]
+    assert usable_in(watch, environment, calm) == [ALL_READINGS] * 4
+    raised = [frame(item=item, value=170, attention=True, gyro=1827) for item in range(before)]
+    assert usable_in(watch, environment, raised) == [Reading(0)] * before
+    said = frame(item=3, value=int(bit), attention=True, gyro=1828)
+    later = frame(item=0, value=2048, attention=True, gyro=1829)
+    assert usable_in(watch, environment, [said, later]) == [left, left]
+    over = [frame(item=3, value=0), frame(item=0, value=2048, attention=True, gyro=2047)]
+    assert usable_in(watch, environment, over) == [ALL_READINGS, Reading(0)]  # raised anew: anew unknown
+
+
+def test_attention_without_a_reason_stays_unknown():
+    watch, environment = Plausibility(), Environment()
+    frames = [frame(item=3, value=0x0001, attention=True, gyro=2048 + k) for k in range(4)]
+    assert usable_in(watch, environment, frames) == [Reading(0)] * 4
+
+
+@pytest.mark.parametrize("spike", [900.0, 3500.0, 0.0])
+def test_a_spike_costs_its_own_frame_and_a_lasting_step_its_first(spike):
+    watch = Plausibility()
+    codes = [2048, 2049, spike, 2048, 2049, spike, spike + 1, spike]
+    steps = [bool(watch.update(frame(gyro=code)) & SensorFault.GYRO_STEP) for code in codes]
+    assert steps == [False, False, True, False, False, True, False, False]

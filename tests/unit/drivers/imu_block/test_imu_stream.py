@@ -20,6 +20,7 @@ from drivers.imu_block.protocol import (
     encode_v1,
     encode_v2,
 )
+from drivers.imu_block.sensors import Environment
 
 SIXTEENTH = 1 / 16
 REPLY_BYTES = (
@@ -149,7 +150,8 @@ def test_a_v2_frame_says_what_was_put_in(tick, count, gyro, tilts, item, value, 
         (tilts[0] - tilts[1]) * SIXTEENTH,
         (tilts[2] - tilts[3]) * SIXTEENTH,
     )
-    assert frame.housekeeping == (item, value)
+    possible = value <= (4095, 255, 255, 65535)[item]
+    assert frame.housekeeping == ((item, value) if possible else None)
 
 
 def test_one_wrong_bit_or_lost_byte_anywhere_costs_at_most_one_v2_frame():
@@ -207,8 +209,8 @@ def test_v1_chunks_lost_on_the_way_are_counted_and_cost_no_further_frame():
 def test_a_gyro_jump_costs_one_v1_frame_and_a_lasting_one_is_followed():
     parser = FrameParser(1)
     stream = b"".join(v1(k) for k in range(1, 6)) + v1(6, 3500) + b"".join(v1(k) for k in range(7, 9))
-    assert [f.sequence for f in parser.feed(stream)] == [1, 2, 3, 4, 5, 8]
-    assert parser.counters.rejected_step == 2
+    assert [f.sequence for f in parser.feed(stream)] == [1, 2, 3, 4, 5, 7, 8]
+    assert parser.counters.rejected_step == 1
     lasting = parser.feed(b"".join(v1(k, 3500) for k in range(9, 14)))
     assert [f.sequence for f in lasting] == [10, 11, 12, 13]
 
@@ -225,6 +227,60 @@ def test_values_no_sensor_gives_are_rejected_in_both_versions():
 
     assert parser.feed(seal(content)) == []
     assert parser.counters.rejected_implausible == 1
+
+
+@pytest.mark.parametrize(("item", "value"), [(0, 4096), (0, 65535), (1, 256), (1, 65535), (2, 65535)])
+def test_a_temperature_that_no_chip_gives_is_set_aside_and_the_sample_kept(item, value):
+    parser, environment = FrameParser(2), Environment()
+    for tick, stated in ((4, (item, 170)), (8, (item, value))):
+        (frame,) = parser.feed(
+            encode_v2(
+                tick_ms=tick, sample_count=4, gyro_counts=2048, tilt_counts=(1024,) * 4, housekeeping=stated
+            )
+        )
+        environment.update(frame)
+    assert frame.housekeeping is None
+    assert (parser.counters.frames_good, parser.counters.rejected_implausible) == (2, 1)
+    known = (
+        environment.temperature_gyro_c,
+        environment.temperature_tilt_x_c,
+        environment.temperature_tilt_y_c,
+    )
+    assert -300.0 < known[item] < 100.0
+
+
+@pytest.mark.parametrize("make", [lambda k: v1(k), lambda k: v2(4 * k, count=4)], ids=["v1", "v2"])
+@pytest.mark.parametrize("again", [(20,), (18, 19, 20), (20, 20, 20)])
+def test_frames_that_come_twice_are_taken_once_and_begin_nothing(make, again):
+    version = 1 if len(make(1)) == protocol.V1_WIRE_BYTES else 2
+    parser = FrameParser(version)
+    order = [*range(1, 21), *again, *range(21, 31)]
+    frames = parser.feed(b"".join(make(k) for k in order))
+    assert len(frames) == 30
+    counters = parser.counters
+    assert (counters.rejected_sequence, counters.discontinuities, counters.frames_lost) == (len(again), 0, 0)
+
+
+@pytest.mark.parametrize("missing", [100, 200, 300, 2814, 5000])
+@pytest.mark.parametrize("make", [lambda k: v1(k), lambda k: v2(k, count=1)], ids=["v1", "v2"])
+def test_frames_that_noise_swallowed_are_counted_after_the_stream_was_found_again(make, missing):
+    parser = FrameParser()
+    size = len(make(1))
+    before, after = (b"".join(make(k) for k in range(a, a + 40)) for a in (1, 41 + missing))
+    noise = bytes([0x55, 0x13]) * (missing * size // 2)
+    got = parser.feed(before) + parser.feed(noise) + parser.feed(after)
+    assert parser.detected_version == (1 if size == protocol.V1_WIRE_BYTES else 2)
+    assert len(got) == 80
+    assert parser.counters.frames_lost == missing
+    assert parser.counters.locks == 2
+
+
+@pytest.mark.parametrize("make", [lambda k: v1(k), lambda k: v2(4 * k, count=4)], ids=["v1", "v2"])
+@pytest.mark.parametrize("ran", [100, 150, 230, 1200])
+def test_a_block_that_starts_again_has_lost_no_frames(make, ran):
+    parser = FrameParser()
+    parser.feed(b"".join(make(k) for k in range(1, ran)) + b"\xf8" + b"".join(make(k) for k in range(1, 30)))
+    assert (parser.counters.frames_lost, parser.counters.discontinuities) == (0, 1)
 
 
 def test_lost_v2_frames_are_counted_by_tick_also_over_the_wrap():

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import LinkLost, NotFound
 from drivers.valve_bus.port import ValveBusPort
-from drivers.valve_bus.protocol import CanFrame, FloatAir, ValveCommand, decode, encode
+from drivers.valve_bus.protocol import Arm, CanFrame, FloatAir, Stop, ValveCommand, decode, encode
 
 PATIENCE_S = 20.0
 STATUS = CanFrame(0x181, bytes.fromhex("815399000802"))
@@ -171,3 +171,91 @@ def test_an_adapter_that_hangs_up_is_a_lost_link():
         with pytest.raises(LinkLost, match="is lost"):
             for _ in port.frames():
                 pass
+
+
+@pytest.mark.parametrize("interface", sorted(can.VALID_INTERFACES))
+def test_a_back_end_without_its_library_or_adapter_is_not_found_in_a_sentence(interface):
+    config = {"interface": interface, "channel": "no_such_channel", "sleep_after_open": 0.0}
+    if interface == "virtual":  # takes any channel
+        ValveBusPort(config).close()
+        return
+    with pytest.raises(NotFound) as refused:
+        ValveBusPort(config)
+    assert str(refused.value).startswith(f"the valve bus on {interface} no_such_channel cannot be opened: ")
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "channel", ["socket://nowhere", "socket://", "socket://:4000", "socket://a:b", "socket://a:99999"]
+)
+def test_a_socket_without_a_port_is_named(channel):
+    with pytest.raises(NotFound, match=r"expected socket://HOST:PORT"):
+        ValveBusPort({"interface": "slcan", "channel": channel})
+
+
+class FullQueue:
+    """Stands for a socketcan queue that is full for a while: what was tried meanwhile is refused."""
+
+    def __init__(self, port, refusals):
+        self._send, self.refusals, self.sent = port._bus.send, refusals, []
+
+    def __call__(self, message, timeout=None):
+        if self.refusals > 0:
+            self.refusals -= 1
+            raise can.CanOperationError("Failed to transmit", 105)
+        self.sent.append(message.arbitration_id)
+        self._send(message, timeout)
+
+
+def test_what_a_full_queue_refuses_is_sent_later(bus, monkeypatch):
+    port, node = bus
+    full = FullQueue(port, refusals=3)
+    monkeypatch.setattr(port._bus, "send", full)
+    for frame in (COMMAND, encode(Arm(1, is_armed=False)), encode(Stop(1))):
+        port.send(frame)
+    heard = [node.recv(PATIENCE_S).arbitration_id for _ in range(3)]
+    assert sorted(heard) == [0x001, 0x041, 0x101]
+    assert port.counters.lost == 0
+
+
+def test_a_queue_that_stays_full_is_a_lost_link_after_its_time_and_what_was_lost_is_counted(bus, monkeypatch):
+    port, _ = bus
+    monkeypatch.setattr(port._bus, "send", FullQueue(port, refusals=1 << 30))
+
+    def send_on():
+        while True:
+            port.send(COMMAND)
+
+    with pytest.raises(LinkLost, match=r"has taken no frame for 0.1 s"):
+        send_on()
+    assert port.counters.sent == 0
+    assert port.counters.lost > 0
+
+
+def test_a_stop_of_somebody_else_passes_and_ones_own_does_not(bus):
+    port, node = bus
+    port.send(encode(Stop(1)))
+    for stop in (Stop(1), Stop(2, reason=1)):
+        frame = encode(stop)
+        node.send(can.Message(arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False))
+    assert port.read(PATIENCE_S)[1] == encode(Stop(2, reason=1))
+    assert port.counters.own_echoes == 1
+
+
+@pytest.mark.parametrize("flood_id", [0x181, 0x701])
+def test_a_flood_becomes_its_newest_frames_and_a_count(flood_id):
+    with slcan() as (port, adapter):
+        lines = [b"t%03X8%016X\r" % (flood_id, count) for count in range(8000)]
+        adapter.say(b"".join(lines) + b"t2816815399000802\r")
+        arrivals, last = [], None
+        while last != 0x281:
+            arrivals += port.read_newest(PATIENCE_S)
+            last = arrivals[-1].frame.arbitration_id
+        assert sum(arrival.passed for arrival in arrivals) >= 8001
+        assert len(arrivals) < 400
+        kept = [arrival.frame for arrival in arrivals if arrival.frame.arbitration_id == 0x181]
+        if flood_id == 0x181:
+            assert int.from_bytes(kept[-1].data, "big") == 7999
+        else:
+            assert kept == []
+            assert port.counters.foreign == 8000

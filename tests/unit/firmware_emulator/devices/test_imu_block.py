@@ -2,6 +2,7 @@ from itertools import pairwise
 
 import pytest
 
+from drivers.imu_block.packet import seal
 from drivers.imu_block.protocol import (
     Ack,
     FrameParser,
@@ -159,3 +160,25 @@ def test_noise_on_the_receive_side_disturbs_nothing():
     talk(laboratory, S)
     reported = talk(laboratory, S + 100 * MS, [bytes(range(256)), encode_ping(8)])
     assert [pong.tag for pong in only(Pong, reported)] == [8]
+
+
+@pytest.mark.parametrize(("baud", "least"), [(115200, 2), (250000, 1)])
+def test_the_smallest_averaging_is_what_the_line_carries(baud, least):
+    laboratory = block(baud=baud)
+    parser = FrameParser(2)
+    talk(laboratory, S, parser=parser)
+    reported = talk(laboratory, 2 * S, [encode_set_averaging(3, least)], parser)
+    assert only(Ack, reported) == [Ack(3, 0x42, DONE)]
+    assert only(ImuFrame, reported)[-1].sample_count == least
+    assert parser.counters.frames_lost == 0
+
+
+@pytest.mark.parametrize("content", ["4001", "400102ff", "4203", "42030405", "4304", "44055254ff", "440552"])
+def test_a_known_command_of_a_wrong_length_is_a_bad_argument_and_one_without_a_tag_nothing(content):
+    laboratory = block()
+    talk(laboratory, S)
+    packet = bytes.fromhex(content)
+    expected = [] if content == "4001" else [Ack(packet[1], packet[0], BAD_ARGUMENT)]
+    if content == "4001":
+        packet = packet[:1]
+    assert only(Ack, talk(laboratory, S + 100 * MS, [seal(packet)])) == expected

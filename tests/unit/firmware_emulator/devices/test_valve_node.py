@@ -294,3 +294,83 @@ def test_the_heartbeat_names_the_state(flying):
     flying.wait(flying.now_ms + 250)
     beats = [m for _, m in flying.received if isinstance(m, Heartbeat)]
     assert beats[-1].state is NodeState.STOPPED
+
+
+def test_a_pulse_that_a_disarmed_node_noted_does_not_open_after_arming():
+    bench = Bench()
+    bench.wait(100, commanding=True)
+    noted = ValveCommand(0, (bench.counter + 1) % 16, bench.pulse, PULSE)
+    bench.send(Arm(0, is_armed=True), noted)
+    bench.settle()
+    status = bench.status()
+    assert (status.is_armed, status.open_mask) == (True, 0)
+    assert status.executed_counter == noted.counter
+    bench.counter = noted.counter
+    bench.command()
+    bench.settle()
+    assert bench.status().open_mask == 0x0F
+
+
+@pytest.mark.parametrize("is_armed", [True, False])
+def test_only_a_repeated_counter_is_rejected(is_armed):
+    bench = Bench()
+    bench.send(Arm(0, is_armed=is_armed))
+    bench.wait(400, commanding=True)
+    assert bench.status().rejected_commands == 0
+    for _ in range(3):
+        bench.send(ValveCommand(0, bench.counter, bench.pulse, PULSE))
+        bench.settle()
+    assert bench.status().rejected_commands == 3
+
+
+@pytest.mark.parametrize("is_armed", [True, False])
+def test_the_dead_man_runs_from_power_up_and_ends_with_the_first_command(is_armed):
+    bench = Bench()
+    bench.send(Arm(0, is_armed=is_armed))
+    bench.wait(95)
+    assert not any(row.is_dead_man_closed for _, row in bench.received if isinstance(row, ValveStatus))
+    bench.wait(125)
+    status = bench.status()
+    assert (status.is_dead_man_closed, status.is_armed) == (True, is_armed)
+    bench.command()
+    bench.settle()
+    assert not bench.status().is_dead_man_closed
+
+
+@pytest.mark.parametrize("grace_s", [0.0, 0.3])
+def test_a_stop_before_the_first_command_shows(grace_s):
+    bench = Bench()
+    bench.send(Stop(0, StopReason.OPERATOR, grace_s))
+    bench.settle()
+    assert bench.status().is_stop_pending is (grace_s > 0)
+    bench.wait(400)
+    status = bench.status()
+    assert is_landed(status)
+    assert status.is_stopped
+
+
+def test_arming_and_disarming_reset_the_landing_and_nothing_else(flying):
+    flying.send(ValveCommand(0, flying.counter, flying.pulse, PULSE), Stop(0))
+    flying.settle()
+    before = flying.status()
+    for is_armed in (False, True):
+        flying.send(Arm(0, is_armed=is_armed))
+        flying.settle()
+        status = flying.status()
+        assert not status.is_stopped
+        assert status.executed_counter == before.executed_counter
+        assert status.executed_pulse_id == before.executed_pulse_id
+        assert status.rejected_commands == before.rejected_commands == 1
+
+
+@pytest.mark.parametrize("identifier", [0x040, 0x080, 0x100])
+@pytest.mark.parametrize("change", [-1, 1])
+def test_a_frame_of_a_wrong_length_is_ignored_and_not_counted(flying, identifier, change):
+    good = {0x040: Arm(0, is_armed=False), 0x080: FloatAir(0, is_on=False)}.get(identifier)
+    data = encode(good or ValveCommand(0, flying.counter, flying.pulse, PULSE)).data
+    longer = (data + b"\x00")[:8] if change > 0 else data[:-1]
+    flying.send(CanFrame(identifier, longer))
+    flying.settle()
+    status = flying.status()
+    assert (status.is_armed, status.is_float_air_on) == (True, True)
+    assert status.rejected_commands == (1 if len(longer) == len(data) else 0)

@@ -36,7 +36,7 @@ def ruling(*, air_on):
 
 def arrive(writer, message, now_ms=0):
     frame = encode(message)
-    return list(writer.receive(CanIn(0, "", frame.arbitration_id, frame.data), now_ms * MS))
+    return list(writer.receive(CanIn(now_ms * MS, "", frame.arbitration_id, frame.data), now_ms * MS))
 
 
 def status(vehicle=INDEX, **changes):
@@ -100,6 +100,19 @@ class TestAir:
 
 
 class TestReports:
+    def test_a_status_that_waited_has_the_age_it_has(self, writer):
+        frame = encode(status())
+        (reported,) = writer.receive(CanIn(20 * MS, "", frame.arbitration_id, frame.data), 2_500 * MS)
+        assert reported.stamp_ns == 20 * MS
+
+    @pytest.mark.parametrize("passed", [1, 160])
+    def test_frames_that_passed_unseen_count_as_load_of_the_bus(self, writer, passed):
+        frame = encode(status())
+        for at_ms in range(0, 2_000, 20):
+            message = CanIn(at_ms * MS, "", frame.arbitration_id, frame.data, passed)
+            (reported,) = writer.receive(message, at_ms * MS)
+        assert reported.bus_rate_hz == pytest.approx(50.0 * passed, rel=0.05)
+
     def test_a_status_is_published(self, writer):
         (reported,) = arrive(writer, status(), 20)
         assert isinstance(reported, ValveStatus)
