@@ -1,6 +1,7 @@
 """Bytes and text of a file, refused in one sentence."""
 
 import codecs
+import os
 from pathlib import Path
 
 from drivers.files.errors import FileError
@@ -28,6 +29,16 @@ def read_bytes(path: Path) -> bytes:
         raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
     except ValueError as error:  # a NUL in the name
         raise FileError(f"{str(path)!r}: cannot be read ({error}).") from error
+
+
+def path_of(text: str) -> Path:
+    """The path that a file states, whatever the locale: names are UTF-8 in files and on disks."""
+    return Path(os.fsdecode(text.encode(errors="surrogateescape")))
+
+
+def text_of_path(path: Path) -> str:
+    """A path as files state it."""
+    return os.fsencode(path).decode(errors="replace")
 
 
 def text_of(data: bytes, path: Path) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.cli.command import Command, Group
 from groundstation.cli.extensions import BrokenCommandError, Row, extension, extensions
+from groundstation.cli.plain_words import speak_any_locale
 
 if TYPE_CHECKING:
     import typer
@@ -138,6 +139,7 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
+    from groundstation.cli.strict_numbers import check_numbers
     from groundstation.core.library import CoreError
     from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import FileError
@@ -148,13 +150,22 @@ def call(words: list[str]) -> int:
         os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
-        build(words)(words, prog_name="groundstation")
+        app = build(words)
+        check_numbers(app)
+        app(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
         return _refuse(error, 2)
     except (GroundStationError, CoreError) as error:
         return _refuse(error, 1)
+    except BrokenPipeError:  # nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 1
+    except OSError as error:
+        if error.filename is None:
+            raise
+        return _refuse(OSError(f"{error.filename}: {error.strerror}."), 2)
     return 0
 
 
@@ -171,6 +182,7 @@ def _refuse(error: Exception, code: int) -> int:
 def main() -> None:
     """Entry point."""
     words = sys.argv[1:]
+    speak_any_locale()
     if words[:1] == ["run"]:  # before NumPy loads: a run forks its processes, and threads are not forked
         os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
     try:

@@ -1,5 +1,5 @@
 """Bytes and text of a file, as ``drivers.files`` reads them for the emulator, too."""
 
-from drivers.files.reading import read_bytes, text_of
+from drivers.files.reading import path_of, read_bytes, text_of, text_of_path
 
-__all__ = ["read_bytes", "text_of"]
+__all__ = ["path_of", "read_bytes", "text_of", "text_of_path"]

@@ -20,6 +20,7 @@ from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
 from groundstation.recording.resync import Lost, walk
 from groundstation.recording.software import software
+from groundstation.recording.writer import check_new_recording
 
 
 @dataclass(slots=True)
@@ -57,8 +58,7 @@ def recover(source: Path, target: Path) -> Recovery:
     Raises:
         RecordingError: The source cannot be read or is no MCAP file, or the target is already there.
     """
-    if target.exists():
-        raise RecordingError(f"{target} is already there: recordings are never overwritten")
+    check_new_recording(target)
     temporary = target.with_name(f".{os.getpid()}.recovering")
     try:
         with source.open("rb") as file:

@@ -32,6 +32,7 @@ from groundstation.recording.software import software
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+SUFFIX = ".mcap"
 PART_SUFFIX = ".part"
 FLUSH_PERIOD_NS = 250_000_000
 MOST_RECENT = 256
@@ -237,9 +238,27 @@ def on_disk(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path} cannot be written any further: {error.strerror or error}") from error
 
 
+def check_new_recording(path: Path) -> None:
+    """Refuse a path to which no recording can be written, before any work is done.
+
+    Raises:
+        RecordingError: It does not end in ``.mcap``, is taken, too long, or lies behind a file.
+    """
+    if path.suffix != SUFFIX:
+        raise RecordingError(f"{path} must end in {SUFFIX}: that is how viewers and reports know recordings")
+    try:
+        if path.exists():
+            raise RecordingError(f"{path} is already there: recordings are never overwritten")
+        path.with_name(path.name + PART_SUFFIX).exists()
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written: {error.strerror}") from error
+    behind = next((parent for parent in path.parents if parent.exists()), path)
+    if not behind.is_dir():
+        raise RecordingError(f"{path} cannot be written: {behind} is no folder")
+
+
 def _open_new(path: Path, part_path: Path) -> io.BufferedWriter:
-    if path.exists():
-        raise RecordingError(f"{path} is already there: recordings are never overwritten")
+    check_new_recording(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if part_path.exists():

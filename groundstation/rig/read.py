@@ -18,7 +18,7 @@ from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.tables import Tables
 from groundstation.files.errors import FileError
-from groundstation.files.reading import read_bytes, text_of
+from groundstation.files.reading import path_of, read_bytes, text_of
 from groundstation.files.toml_file import toml_of
 from groundstation.parts.table import installed_tables
 from groundstation.rig.compose import rig_model
@@ -165,7 +165,7 @@ class _Reader:
         self._read: dict[Path, RigFile] = {}
 
     def __call__(self, name: str) -> RigFile:
-        path = self._folder / name
+        path = self._folder / path_of(name)
         found = self._read.get(path)
         if found is None:
             found = self._read[path] = RigFile(path, self._bytes(path))

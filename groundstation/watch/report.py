@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.declarations.errors import UsageError
+from groundstation.files.writing import check_folder, write_file
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
@@ -20,7 +21,9 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
 
     Raises:
         UsageError: The recording holds no vehicle's state.
+        FileError: The folder cannot be written.
     """
+    check_folder(folder)
     progress("reading the recording", 0.0)
     tables = installed_tables()
     with Recording(recording) as source:
@@ -48,7 +51,7 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         "vehicles": {name: report.numbers for name, report in reports.items()},
     }
     path = folder / "report.json"
-    path.write_text(json.dumps(_plain(summary), indent=1) + "\n")
+    write_file(path, json.dumps(_plain(summary), indent=1) + "\n")
     progress("done", 1.0)
     return [path, *written]
 
