@@ -237,7 +237,8 @@ class Launcher:
             rig_text=self._rig_text,
             files=self._files,
             endpoint=self.endpoint,
-            recording=None if self._recording is None else _numbered(self._recording, child.restarts),
+            recording=self._recording,
+            restarts=child.restarts,
             utc_offset_ns=time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns(),
             sequences_after=round(elapsed_s * SEQUENCES_PER_S) if child.restarts else 0,
         )
@@ -307,8 +308,3 @@ def _package_of(name: str) -> str:
         known = ", ".join(sorted(found)) or "none"
         raise RigError(f"laboratory.name: {name!r} is not installed (installed: {known})")
     return found[name].module.partition(".")[0]
-
-
-def _numbered(recording: Path, restarts: int) -> Path:
-    """A recorder that starts again writes a file of its own: nothing recorded is overwritten."""
-    return recording if restarts == 0 else recording.with_stem(f"{recording.stem}_{restarts}")
