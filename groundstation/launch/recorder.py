@@ -46,8 +46,8 @@ def run(orders: Orders) -> None:
     info = recording_info(rig, orders.rig_text, orders.rig_path, None, orders.utc_offset_ns)
     batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     stop_when_asked(lambda: batches.put(None))
-    recorder = _begin(next_name(orders.recording) if orders.restarts else orders.recording, info)
-    with ZenohBus(orders.endpoint) as bus:
+    with ZenohBus(orders.endpoint) as bus:  # first: without a hub no file is begun
+        recorder = _begin(next_name(orders.recording) if orders.restarts else orders.recording, info)
         reporter = RecorderReporter(recorder, bus, orders.process, orders.sequences_after)
         bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
         reporter.look(time.monotonic_ns())
