@@ -28,6 +28,7 @@ COMMANDS: dict[str, Row] = {
     "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "faults": Command("groundstation.cli.faults:app", "Show modes, what moves them, and every fault."),
+    "demo": Command("groundstation.cli.demo:app", "Make small data sets of every kind to try commands on."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),

@@ -73,6 +73,8 @@ def write_files(contents: Mapping[Path, Content]) -> None:
         for path in parts:
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if path.exists() and not path.is_file():  # a device or a pipe would be replaced by a file
+                raise OSError(errno.EINVAL, "it is no file")
         for path, part in parts.items():
             os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
     except OSError as error:
