@@ -31,7 +31,7 @@ def write_frame(folder: Path, number: int, picture: NDArray[np.uint8]) -> str:
     frames = folder / "frames"
     frames.mkdir(exist_ok=True)
     name = f"{number:05d}"
-    cv2.imwrite(str(frames / f"{name}.png"), picture)
+    (frames / f"{name}.png").write_bytes(cv2.imencode(".png", picture)[1].tobytes())
     return name
 
 

@@ -1,5 +1,6 @@
 """``groundstation demo``: small data sets of every kind, to try commands on without a laboratory."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,7 @@ import typer
 from drivers.laboratory.demo_data import demo_kinds
 from groundstation.cli.progress import with_progress
 from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
 from groundstation.files.writing import check_folder, whole_folder
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -40,8 +42,13 @@ def data(
             raise UsageError(f"{folder / kind.name} is already there: name another folder")
     folder.mkdir(parents=True, exist_ok=True)
     for kind in with_progress(wanted, "making"):
-        with whole_folder(folder / kind.name) as made:
-            kind.make(made, seed)
+        try:
+            with whole_folder(folder / kind.name) as made:
+                kind.make(made, seed)
+        except OSError as error:
+            with suppress(OSError):  # it stays where it holds something
+                folder.rmdir()
+            raise FileError(f"{folder / kind.name}: cannot be written ({error.strerror}).") from error
     for kind in wanted:
         print(f"{kind.name}: {kind.summary}")
         for words in kind.commands:

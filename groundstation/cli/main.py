@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -43,6 +44,7 @@ ALIASES = {
     ("star-tracker", "overhead-pose"): ("calibrate", "overhead"),
 }
 """Spellings of before that go on working."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 DEBUG = "GROUNDSTATION_DEBUG"
 """Set in the environment, or by ``--debug`` on the line: an error's traceback comes before its sentence."""
 
@@ -164,9 +166,10 @@ def call(words: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 1
     except OSError as error:
-        if error.filename is None:
+        if error.filename is None and error.errno not in _FULL:
             raise
-        return _refuse(OSError(f"{error.filename}: {error.strerror}."), 2)
+        where = "" if error.filename is None else f"{error.filename}: "
+        return _refuse(OSError(f"{where}{error.strerror}."), 2)
     return 0
 
 

@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -154,6 +156,21 @@ def test_nothing_is_written_over_and_no_file_is_taken_for_a_folder(made, tmp_pat
     for target in (tmp_path / "file", tmp_path / "file" / "x", tmp_path / ("x" * 300)):
         assert call(["demo", "data", str(target)]) == 2
         assert "no such folder can be made" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_one_sentence_and_leaves_nothing(tmp_path):
+    script = (
+        "import resource; from groundstation.cli.main import main;"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); main()"
+    )
+    for kind in ("rest", "board"):
+        words = [sys.executable, "-c", script, "demo", "data", str(tmp_path / "try"), "--only", kind]
+        done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=ROOT)
+        assert done.returncode == 2
+        assert (
+            done.stderr == f"groundstation: {tmp_path / 'try' / kind}: cannot be written (File too large).\n"
+        )
+        assert not list(tmp_path.iterdir())
 
 
 def test_every_kind_is_named_in_the_docs():
