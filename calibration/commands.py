@@ -4,7 +4,7 @@ from groundstation.cli.command import Command, Group
 
 CALIBRATE = Group(
     "From recordings to calibration numbers.",
-    "groundstation calibrate zero-offset FOLDER --out rest.toml",
+    "groundstation calibrate zero-offset try/rest --out rest.toml",
     {
         "zero-offset": Command("calibration.imu.commands:zero_offset", "IMU: offsets from a rest."),
         "zero-offset-fit": Command(

@@ -24,6 +24,7 @@ from calibration.delivery import deliver
 from calibration.guidance import Advice
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Provenance
+from groundstation.bus.zenoh_bus import HubError
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
@@ -203,7 +204,7 @@ def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven
     node = GuideNode(chosen, guide, _print_advice, getpass.getuser() if is_driven else "")
     try:
         run_beside(rig, run.endpoint, "guided_calibration", node, lambda: node.is_done)
-    except zenoh.ZError as error:
+    except (zenoh.ZError, HubError) as error:
         raise GroundStationError(f"the run at {run.endpoint} does not let us in: {error}") from error
     if node.trouble:
         raise GroundStationError(node.trouble)

@@ -10,6 +10,7 @@ from typing import Annotated
 
 from pydantic import AliasChoices, Field, ValidationInfo, model_validator
 
+from drivers.files.reading import path_of
 from drivers.valve_bus.protocol import MAX_VEHICLES
 from firmware_emulator.applicability import why_not
 from firmware_emulator.failures import FAILURE_KINDS, FailureConfig
@@ -65,7 +66,7 @@ class LaboratoryConfig(Settings):
 
     def path(self, path: str) -> str:
         """A path of the scenario as seen from here."""
-        return str(Path(self.folder) / path)
+        return str(Path(self.folder) / path_of(path))
 
     @model_validator(mode="after")
     def _names_are_unique_and_known(self) -> "LaboratoryConfig":

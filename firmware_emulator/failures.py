@@ -12,6 +12,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
+from drivers.files.amounts import check_amounts
 from firmware_emulator.failure_kinds import FAILURE_KINDS, FailureKind, Parameter, checked
 
 __all__ = ["FAILURE_KINDS", "Failure", "FailureConfig", "FailureKind", "Failures", "Parameter", "checked"]
@@ -41,6 +42,7 @@ class FailureConfig(BaseModel):
         filled = checked(self.kind, self.parameters, kinds)
         if not self.end_s > self.start_s:
             raise ValueError(f"failure {self.kind!r} ends (end_s) before it starts (start_s)")
+        check_amounts({"start_s": self.start_s, "parameters": self.parameters})
         self.parameters.update(filled)
         return self
 

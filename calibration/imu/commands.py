@@ -33,7 +33,7 @@ Vehicle = Annotated[str | None, typer.Option(help="Of a recording with several v
 def zero_offset(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
     """Mean of the rest at the start, after a test that it was one.
 
-    Example: groundstation calibrate zero-offset samples/fusion/station --out rest.toml
+    Example: groundstation calibrate zero-offset try/rest --out rest.toml
     """
     _calibrate(source, vehicle, procedures.offsets_at_rest, out, plot, with_stars=False)
 
@@ -48,7 +48,7 @@ def zero_offset_fit(
 ) -> None:
     """Least squares for the accelerometers' constant offsets (mu, nu) over a stretch, as published.
 
-    Example: groundstation calibrate zero-offset-fit FOLDER --start-s 10 --end-s 30 --out fit.toml
+    Example: groundstation calibrate zero-offset-fit try/flight --start-s 20 --end-s 40 --out fit.toml
     """
     if not end_s > start_s:
         raise UsageError(f"--end-s must be after --start-s, found {start_s:g} and {end_s:g}.")
@@ -59,7 +59,7 @@ def zero_offset_fit(
 def temperature(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
     """Temperature slopes of the gyro's null and the tilt offsets, from a long rest that warms up.
 
-    Example: groundstation calibrate temperature warm_up/ --out temperature.toml
+    Example: groundstation calibrate temperature try/rest --out temperature.toml
     """
     _calibrate(source, vehicle, procedures.temperature_slopes, out, plot, with_stars=False)
 
@@ -67,7 +67,7 @@ def temperature(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = 
 def gyro_scale(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) -> None:
     """Gyro scale by full turns against the stars.
 
-    Example: groundstation calibrate gyro-scale samples/fusion/spin --out scale.toml
+    Example: groundstation calibrate gyro-scale try/flight --out scale.toml
     """
     _calibrate(source, vehicle, procedures.gyro_scale_by_turns, out, plot)
 
@@ -78,7 +78,7 @@ def allan(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = None) 
     White noise takes some seconds; a bias instability ten times the averaging time at which the curve turns
     up again: 17 min for a floor at 100 s. What the record is too short for is said, not printed.
 
-    Example: groundstation calibrate allan night_at_rest/ --out noise.toml --plot noise.png
+    Example: groundstation calibrate allan try/rest --out noise.toml --plot noise.png
     """
     _calibrate(source, vehicle, noise.noise_at_rest, out, plot, with_stars=False)
 
@@ -143,7 +143,7 @@ def joint(
     the IMU. With --table-map the slope by place comes from the same flight, fitted together with its biases,
     scales, lever arm and delay (`calibrate table-map` takes many flights and draws it).
 
-    Example: groundstation calibrate joint samples/fusion/spin --out joint.toml --plot residuals.png
+    Example: groundstation calibrate joint try/flight --out joint.toml --plot residuals.png
     """
     from calibration.table.procedure import map_of_sources  # half of what is loaded, for one option
     from calibration.table.smoothed_flights import read_source

@@ -55,14 +55,10 @@ def load_tilts(path: Path) -> Tilts:
     """Read along_x_deg, along_y_deg: a row per rest.
 
     Raises:
-        FileError: The file is missing or wrong.
-        UsageError: A tilt is too large.
+        FileError: The file is missing or wrong, or a tilt is too large.
     """
-    along_deg = load_table(path, TILT_COLUMNS).numbers
-    largest = np.abs(along_deg).max()
-    if largest >= LARGEST_TILT_DEG:
-        raise UsageError(f"{path}: a tilt must be within {LARGEST_TILT_DEG:g} deg, found {largest:g}.")
-    return Tilts(path, np.radians(along_deg))
+    most = dict.fromkeys(TILT_COLUMNS, LARGEST_TILT_DEG)
+    return Tilts(path, np.radians(load_table(path, TILT_COLUMNS, most=most).numbers))
 
 
 def rests_of(name: str, data: FlightData, least_s: float, known: TableMap | None) -> RestsFound:

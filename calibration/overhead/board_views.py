@@ -17,6 +17,7 @@ from groundstation.files.number_tables import load_table
 from groundstation.files.reading import read_bytes
 from groundstation.overhead.overhead_camera import OverheadCamera
 
+_FARTHEST_M, _MOST_DEG = 100.0, 720.0
 NO_POSE = {"position_table_m": [0.0, 0.0, 1.0], "yaw_rad": 0.0, "tilt_x_rad": 0.0, "tilt_y_rad": 0.0}
 """Stands in for the pose in a file that knows only the lens."""
 
@@ -48,7 +49,8 @@ def read_board_views(folder: Path, printed: Board) -> tuple[list[BoardView], Ove
 
 def _read_places(path: Path, frames: set[str]) -> dict[str, tuple[float, float, float]]:
     """Read places.csv: x, y (m) and heading (rad) by picture."""
-    table = load_table(path, ("x_m", "y_m", "heading_deg"), ("frame",), unique=("frame",))
+    most = {"x_m": _FARTHEST_M, "y_m": _FARTHEST_M, "heading_deg": _MOST_DEG}
+    table = load_table(path, tuple(most), ("frame",), unique=("frame",), most=most)
     places = {}
     for line, frame, (x_m, y_m, heading_deg) in zip(
         table.lines, table.words["frame"], table.numbers.tolist(), strict=True

@@ -34,7 +34,7 @@ def overhead(
     places.csv has the columns frame,x_m,y_m,heading_deg: where the print's upper left corner lies in the
     table's coordinates, and where its long edge points. One place is enough; several check the tape.
 
-    Example: groundstation calibrate overhead recordings/board --out pose.toml --camera-out camera.json
+    Example: groundstation calibrate overhead try/board_on_table --out pose.toml --camera-out camera.json
     """
     check_targets(out, camera_out, plot)
     printed = printed_board(squares, square_mm, marker_mm, "6x4")

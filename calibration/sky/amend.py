@@ -40,7 +40,7 @@ def amended_list(ceiling: Path, recording: Path, min_sightings: int) -> tuple[st
     names = StarCatalogue.parse(data, ceiling).ids
     text = text_of(data, ceiling)
     found, catalogues = _findings(recording)
-    if catalogues and not any(text_then.rstrip().endswith(text.strip()) for text_then in catalogues):
+    if catalogues and not any(_ends_with(then, text) for then in catalogues):
         raise UsageError(f"{recording}: was recorded with another star list than {ceiling}: amend that one.")
     amendment = propose(names, found, min_sightings)
     left = len(names) - len(amendment.struck) + len(amendment.added)
@@ -57,6 +57,11 @@ def amended_list(ceiling: Path, recording: Path, min_sightings: int) -> tuple[st
     table = parse_table(data, ceiling, (), COLUMNS, optional=COLUMNS[3:])
     title = "Star list amended by the watchdog of the sky"
     return _applied(table, amendment), Outcome(title, "\n".join(words), {}, {}, notes)
+
+
+def _ends_with(text_then: str, text: str) -> bool:
+    """Whether the text in use then is this one, whatever ends its lines."""
+    return "\n".join(text_then.splitlines()).rstrip().endswith("\n".join(text.splitlines()).strip())
 
 
 def _findings(path: Path) -> tuple[list[tuple[str, SkyChange]], list[str]]:

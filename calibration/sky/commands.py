@@ -44,7 +44,7 @@ def lens(
 
     Frames made by turning in place (--wobble-mm) also separate the principal point from the mount.
 
-    Example: groundstation calibrate lens recordings/turn --out lens.toml --camera-out camera.json
+    Example: groundstation calibrate lens try/turn --out lens.toml --camera-out camera.json
     """
     check_targets(out, camera_out, plot)
     sky = read_sky_pictures(folder)
@@ -68,7 +68,7 @@ def mount(
 
     The frames are made by turning the mock-up in place.
 
-    Example: groundstation calibrate mount recordings/turn --out mount.toml --first-heading-deg 90
+    Example: groundstation calibrate mount try/turn --out mount.toml --first-heading-deg 0
     """
     check_targets(out, camera_out, plot)
     sky = read_sky_pictures(folder)
@@ -99,7 +99,7 @@ def board(
 
     A chessboard or a ChArUco board, seen at many angles all over the picture.
 
-    Example: groundstation calibrate board recordings/board --squares 9x6 --square-mm 30 --out lens.toml
+    Example: groundstation calibrate board try/board --squares 9x6 --square-mm 30 --out lens.toml
     """
     cv2.setNumThreads(1)
     check_targets(out, camera_out, plot)
@@ -168,7 +168,7 @@ def survey(
     The sweep's frames overlap. Two anchors or more (anchors.csv: id,x_m,y_m,frame,u,v)
     fix the frame of the table.
 
-    Example: groundstation calibrate survey recordings/sweep --out ceiling.csv --plot ceiling.png
+    Example: groundstation calibrate survey try/sweep --out ceiling.csv --plot ceiling.png
     """
     beside = out.with_suffix(".toml")
     check_targets(out, beside, camera_out, plot)

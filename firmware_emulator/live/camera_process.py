@@ -19,9 +19,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.files.errors import FileError
 from firmware_emulator.device_kind import PictureOrder, Renderer
 from firmware_emulator.live.tcp_server import LOOPBACK
-from firmware_emulator.sky.scene import SceneError
 
 BOUNDARY = "picture"
 NS_PER_S = 1_000_000_000
@@ -142,7 +142,7 @@ def main(port: int) -> int:
         for row in json.loads(sys.stdin.readline()):
             order = PictureOrder(**row)
             cameras[order.name] = LiveCamera(order.load(), order.jpeg_quality)
-    except SceneError as error:
+    except FileError as error:
         print(json.dumps({"error": str(error)}), flush=True)  # noqa: T201 - the answer to the parent
         return 2
     server = make_server(cameras, port)

@@ -3,7 +3,6 @@
 import argparse
 import signal
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,8 +10,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from drivers.errors import NotFound
+from drivers.files.errors import FileError
+from drivers.files.reading import read_bytes
+from drivers.files.trees import parse_toml
 from firmware_emulator.live.server import LiveLaboratory
-from firmware_emulator.sky.scene import SceneError
 
 _DESCRIPTION = (
     "Emulate the laboratory of a rig in real time. Prints one JSON line that says where each channel can be "
@@ -31,12 +32,7 @@ class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters
 
 def read_laboratory(path: Path) -> dict[str, object]:
     """The `[laboratory]` table of a rig file, with `folder` set to where the file lies."""
-    try:
-        rig = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise _BadRig(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise _BadRig(f"{path}: is no TOML file ({error})") from error
+    rig = parse_toml(read_bytes(path), path)
     table = rig.get("laboratory")
     if not isinstance(table, Mapping):
         raise _BadRig(f"{path}: has no table [laboratory]")
@@ -69,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
         except ValidationError as error:
             return _refuse(f"{options.rig}: {sentence(error)}")
-        except (_BadRig, SceneError, NotFound) as error:
+        except (_BadRig, FileError, NotFound) as error:
             return _refuse(str(error))
         except _Ended:
             return 0

@@ -1,14 +1,13 @@
 """Files of the camera over the table and of the circles on the mock-ups, as the emulator reads them."""
 
-import json
-import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
+from drivers.files.reading import read_bytes
+from drivers.files.trees import parse_json, parse_toml
 from firmware_emulator.overhead.optics import OverheadOptics
-from firmware_emulator.sky.scene import SceneError
+from firmware_emulator.sky.scene import SceneError, is_number
 
 _NUMBERS = {"dist_k1_k2_p1_p2_k3": 5, "position_table_m": 3}
 
@@ -35,19 +34,18 @@ def read_overhead_camera(path: Path) -> OverheadOptics:
     """Optics of a camera file (JSON).
 
     Raises:
-        SceneError: The file is missing, or a key is missing or holds something else than its number.
+        FileError: The file is missing, or a key is missing or holds something else than its number.
     """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{path}: cannot read the camera file: {error}") from error
+    data = parse_json(read_bytes(path), path)
 
     def numbers(key: str) -> tuple[float, ...]:
-        value = data.get(key) if isinstance(data, dict) else None
+        value = data.get(key)
         values = value if isinstance(value, list) else [value]
-        found = [float(item) for item in values if _is_number(item)]
+        found = [float(item) for item in values if is_number(item)]
         if not len(found) == len(values) == _NUMBERS.get(key, 1):
-            raise SceneError(f"{path}: key {key!r} must hold {_NUMBERS.get(key, 1)} numbers, found {value!r}")
+            raise SceneError(
+                f"{path}: key {key!r} must hold {_NUMBERS.get(key, 1)} numbers, found {value!r:.80}"
+            )
         return tuple(found)
 
     k1, k2, p1, p2, k3 = numbers("dist_k1_k2_p1_p2_k3")
@@ -74,21 +72,17 @@ def read_markings(path: Path) -> dict[str, Markings]:
     """The discs of every mock-up (TOML).
 
     Raises:
-        SceneError: The file is missing or is not of that form.
+        FileError: The file is missing or is not of that form.
     """
+    data = parse_toml(read_bytes(path), path)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
         return {name: _markings(table) for name, table in data.items()}
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SceneError(f"{path}: cannot read the circles: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise SceneError(f"{path}: expected tables with height_m, radius_m and circles: {error!r}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise SceneError(
+            f"{path}: expected tables with height_m, radius_m and circles: {error!r:.200}"
+        ) from error
 
 
 def _markings(table: dict[str, Any]) -> Markings:
     discs = tuple(Disc(str(row["colour"]), float(row["x_m"]), float(row["y_m"])) for row in table["circles"])
     return Markings(float(table["height_m"]), float(table["radius_m"]), discs)
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

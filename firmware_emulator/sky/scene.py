@@ -1,13 +1,16 @@
 """Files of an emulated ceiling and camera, and a sky made of them."""
 
-import csv
-import json
 import math
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.files.errors import FileError
+from drivers.files.number_tables import load_table
+from drivers.files.reading import read_bytes
+from drivers.files.trees import parse_json
 from firmware_emulator.sky.optics import CameraOptics
 from firmware_emulator.sky.sky import Glow, Sky
 
@@ -17,52 +20,36 @@ _GLOW_RADIUS_M = (0.25, 0.6)
 _GLOW_BRIGHTNESS = (1.5, 7.0)
 
 
-class SceneError(ValueError):
-    """A star list or camera file cannot be used; the message names file, place and what was expected."""
+_FARTHEST_M = 100.0  # no ceiling reaches so far: beyond it the list is in millimetres
+
+
+class SceneError(FileError):
+    """A camera file cannot be used; the message names file, place and what was expected."""
 
 
 def read_ceiling(path: Path) -> NDArray[np.float64]:
     """LEDs of a star list (CSV with columns `id,x_m,y_m`), shape (n, 2).
 
     Raises:
-        SceneError: The file is missing, or is no star list.
+        FileError: The file is missing, or is no star list.
     """
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.DictReader(file)
-            missing = {"id", "x_m", "y_m"} - set(rows.fieldnames or ())
-            if missing:
-                raise SceneError(f"{path}: the star list has no column {', '.join(sorted(missing))}")
-            places = [_place(path, rows.line_num, row) for row in rows]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise SceneError(f"{path}: cannot read the star list: {error}") from error
-    if not places:
-        raise SceneError(f"{path}: the star list holds no LED")
-    return np.array(places)
+    return load_table(path, ("x_m", "y_m"), ("id",), most=dict.fromkeys(("x_m", "y_m"), _FARTHEST_M)).numbers
 
 
 def read_camera(path: Path) -> CameraOptics:
     """Optics and mount of a camera file (JSON).
 
     Raises:
-        SceneError: The file is missing, or a key is missing or holds something else than its number.
+        FileError: The file is missing, or a key is missing or holds something else than its number.
     """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{path}: cannot read the camera file: {error}") from error
-    if not isinstance(data, dict):
-        raise SceneError(f"{path}: a camera file is a JSON object, found {type(data).__name__}")
+    data = parse_json(read_bytes(path), path)
 
     def numbers(key: str, count: int) -> tuple[float, ...]:
         found = data.get(key)
         values = found if isinstance(found, list) else [found]
-        if len(values) != count or not all(
-            isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-            for value in values
-        ):
+        if len(values) != count or not all(map(is_number, values)):
             wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
-            raise SceneError(f"{path}: key {key!r} must be {wanted}, found {found!r}")
+            raise SceneError(f"{path}: key {key!r} must be {wanted}, found {found!r:.80}")
         return tuple(map(float, values))
 
     def number(key: str) -> float:
@@ -104,11 +91,11 @@ def build_sky(ceiling_xy_m: NDArray[np.float64], seed: np.random.SeedSequence) -
     return Sky(ceiling_xy_m, brightness, rng, glows)
 
 
-def _place(path: Path, line: int, row: dict[str, str]) -> tuple[float, float]:
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether it is a finite number, not a whole one of hundreds of digits."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
     try:
-        x_m, y_m = float(row["x_m"]), float(row["y_m"])
-    except (TypeError, ValueError) as error:
-        raise SceneError(f"{path}, line {line}: x_m and y_m must be numbers") from error
-    if not (math.isfinite(x_m) and math.isfinite(y_m)):
-        raise SceneError(f"{path}, line {line}: x_m and y_m must be finite, found {x_m} and {y_m}")
-    return x_m, y_m
+        return math.isfinite(value)
+    except OverflowError:
+        return False

@@ -21,6 +21,7 @@ from typing import Any, Self, TypeVar
 import zenoh
 from zenoh.handlers import Callback, Handler, RingChannel
 
+from groundstation.declarations.errors import GroundStationError
 from groundstation.declarations.topic import Delivery, Topic
 
 RIG_OWNER = "rig"
@@ -33,6 +34,12 @@ SUBSCRIBERS_KNOWN_NS = 1_000_000_000
 """The hub reports subscribers within milliseconds of a publisher's declaration; on a busy machine, later."""
 
 T = TypeVar("T")
+
+
+class HubError(GroundStationError):
+    """The hub cannot be opened or reached."""
+
+
 Receive = Callable[[str, bytes, bytes], None]
 """Called with key, payload and attachment from Zenoh's thread: append to a queue and return."""
 
@@ -57,9 +64,17 @@ def open_hub(endpoint: str) -> zenoh.Session:
     """Open the hub that all processes connect to, e.g. at ``tcp/127.0.0.1:7447``.
 
     Raises:
-        zenoh.ZError: The endpoint is taken.
+        HubError: The endpoint is taken, or there is no such network.
     """
-    return zenoh.open(_config("router", listen=(endpoint,)))
+    return _open("opened", endpoint, _config("router", listen=(endpoint,)))
+
+
+def _open(what: str, endpoint: str, config: zenoh.Config) -> zenoh.Session:
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        reason = str(error).partition(" at /")[0].strip(" !.")  # behind it stands a line of Zenoh's source
+        raise HubError(f"the hub at {endpoint} cannot be {what}: {reason}") from error
 
 
 def key_of(topic: Topic, owner: str, *, paced: bool = False) -> str:
@@ -140,12 +155,13 @@ class ZenohBus:
             since an interpreter that is busy must not keep the hub from passing on.
 
     Raises:
-        zenoh.ZError: The hub is not there; or the endpoint is taken.
+        HubError: The hub is not there; or the endpoint is taken.
     """
 
     def __init__(self, endpoint: str, *, is_hub: bool = False) -> None:
         self._is_hub = is_hub
-        self._session = open_hub(endpoint) if is_hub else zenoh.open(_config("client", connect=(endpoint,)))
+        client = _config("client", connect=(endpoint,))
+        self._session = open_hub(endpoint) if is_hub else _open("reached", endpoint, client)
         self._publishers: list[TopicPublisher] = []
         self._at_once: dict[tuple[str, str], TopicPublisher] = {}
         self._record: zenoh.Publisher | None = None

@@ -14,7 +14,7 @@ import typer
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
-from groundstation.files.writing import write_files
+from groundstation.files.writing import check_targets, write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator, FixOutcome, PlanarState
 from groundstation.fusion.estimators import ESTIMATORS
@@ -39,7 +39,7 @@ INPUTS = ("imu.csv", "stars.csv", "meta.json", "truth.csv")
 def _root() -> None:
     """State of a mock-up from its IMU and late star fixes.
 
-    Example: groundstation fusion run FOLDER --out estimate.csv
+    Example: groundstation fusion run try/flight --out estimate.csv
     """
 
 
@@ -55,7 +55,7 @@ def run(
 ) -> None:
     """Estimate the motion in a data set; causal, as if it were live, unless --smooth.
 
-    Example: groundstation fusion run samples/fusion/station --out estimate.csv
+    Example: groundstation fusion run try/flight --out estimate.csv
     """
     if out.name == "fixes.csv":
         raise UsageError("--out must not be called fixes.csv: the account of the fixes goes there.")
@@ -67,6 +67,7 @@ def run(
         raise UsageError(f"--smooth works on the filter, not on --method {method}.")
     if table_map is not None and method != "filter":
         raise UsageError(f"--table-map works on the filter, not on --method {method}.")
+    check_targets(out, out.with_name("fixes.csv"))
     data = read_folder(folder)
     estimator = _estimator(data.noise, method, table_map, smooth=smooth)
     with progress_line() as progress:

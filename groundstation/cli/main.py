@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.cli.command import Command, Group
 from groundstation.cli.extensions import BrokenCommandError, Row, extension, extensions
+from groundstation.cli.plain_words import speak_any_locale
 
 if TYPE_CHECKING:
     import typer
@@ -27,6 +29,7 @@ COMMANDS: dict[str, Row] = {
     "inject": Command("groundstation.cli.inject:app", "Inject a failure into the emulated laboratory."),
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "faults": Command("groundstation.cli.faults:app", "Show modes, what moves them, and every fault."),
+    "demo": Command("groundstation.cli.demo:app", "Make small data sets of every kind to try commands on."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
@@ -41,6 +44,7 @@ ALIASES = {
     ("star-tracker", "overhead-pose"): ("calibrate", "overhead"),
 }
 """Spellings of before that go on working."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 DEBUG = "GROUNDSTATION_DEBUG"
 """Set in the environment, or by ``--debug`` on the line: an error's traceback comes before its sentence."""
 
@@ -138,6 +142,7 @@ def _not_called() -> None:
 def call(words: list[str]) -> int:
     """Run the command line; every error of ours is one sentence. Returns the exit code."""
     from drivers.errors import DeviceError
+    from groundstation.cli.strict_numbers import check_numbers
     from groundstation.core.library import CoreError
     from groundstation.declarations.errors import GroundStationError, UsageError
     from groundstation.files.errors import FileError
@@ -148,13 +153,23 @@ def call(words: list[str]) -> int:
         os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
-        build(words)(words, prog_name="groundstation")
+        app = build(words)
+        check_numbers(app)
+        app(words, prog_name="groundstation")
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except (UsageError, DeviceError, RecordingError, FileError, BrokenCommandError) as error:
         return _refuse(error, 2)
     except (GroundStationError, CoreError) as error:
         return _refuse(error, 1)
+    except BrokenPipeError:  # nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 1
+    except OSError as error:
+        if error.filename is None and error.errno not in _FULL:
+            raise
+        where = "" if error.filename is None else f"{error.filename}: "
+        return _refuse(OSError(f"{where}{error.strerror}."), 2)
     return 0
 
 
@@ -171,6 +186,7 @@ def _refuse(error: Exception, code: int) -> int:
 def main() -> None:
     """Entry point."""
     words = sys.argv[1:]
+    speak_any_locale()
     if words[:1] == ["run"]:  # before NumPy loads: a run forks its processes, and threads are not forked
         os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
     try:

@@ -44,7 +44,7 @@ def overhead(
     mock_ups.toml states which coloured circles each mock-up wears, camera.json is that of the camera over the
     table; ms is the CPU time of the whole picture.
 
-    Example: groundstation star-tracker overhead recordings/table --out answers.csv
+    Example: groundstation star-tracker overhead try/from_above --out answers.csv
     """
     cv2.setNumThreads(1)
     check_targets(out)

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from typing import TypeVar
 
+T = TypeVar("T")
 Progress = Callable[[str, float], None]
 """Takes what is going on and how much of it is done, 0 to 1; NaN where nobody knows."""
 
@@ -14,7 +15,7 @@ def silent(what: str, share: float) -> None:
     del what, share
 
 
-def with_progress(frames: Sequence[Path], what: str) -> Iterator[Path]:
+def with_progress(frames: Sequence[T], what: str) -> Iterator[T]:
     """Iterate with a progress bar."""
     from rich.console import Console  # 50 ms, where a bar may be seen
     from rich.progress import track

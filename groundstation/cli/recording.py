@@ -54,6 +54,8 @@ def recover(
         print(f"{file} had been finished properly")
     if found.torn_bytes:
         print(f"{found.torn_bytes} bytes at the torn end held no more messages")
+    if found.lost_bytes:
+        print(f"{found.lost_bytes} bytes within are no record: passed over")
     for gap in found.gaps:
         print(gap.sentence(found.start_ns))
     if found.orphans:

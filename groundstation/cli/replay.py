@@ -21,7 +21,7 @@ from groundstation.recording.software import software
 from groundstation.recording.writer import Recorder
 from groundstation.rig.plan import make_node
 from groundstation.rig.provenance import changed_files, portable, recorded_rig
-from groundstation.rig.read import parse_rig
+from groundstation.rig.read import parse_rig, read_text
 from groundstation.runners.replay import ReplayRunner
 from groundstation.runners.replay_report import ReplayReport
 from groundstation.runners.tolerances import EXACT, Tolerances, load_tolerances
@@ -88,10 +88,7 @@ def _replay(
 def _rig_of(found: Recording, rig_path: Path | None) -> tuple[RecordingInfo, Rig]:
     info = found.info
     if rig_path is not None:
-        try:
-            info = replace(info, rig_toml=rig_path.read_text(), rig_path=portable(rig_path))
-        except (OSError, UnicodeDecodeError) as error:
-            raise UsageError(f"{rig_path}: cannot be read as a rig file ({error})") from error
+        info = replace(info, rig_toml=read_text(rig_path), rig_path=portable(rig_path))
         return info, parse_rig(info.rig_toml, rig_path)
     if not info.rig_toml:
         raise UsageError(f"{found.path} carries no rig: give one with --rig")

@@ -17,13 +17,15 @@ from groundstation.cli.keys import HELP, Keys, stdin_descriptor
 from groundstation.cli.terminal_view import TerminalView
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
+from groundstation.files.writing import check_folder
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.recording.writer import PART_SUFFIX
+from groundstation.recording.writer import PART_SUFFIX, check_new_recording
 from groundstation.rig.read import parse_rig, read_text
 
 app = typer.Typer(rich_markup_mode=None)
 
+LONGEST_S = 31_557_600.0  # a year: a typo beyond it
 REFRESH_S = 0.25
 LINE_EVERY_S = 2.0
 LANDED_BY_FAULT = 1
@@ -34,7 +36,8 @@ LANDED_BY_FAULT = 1
 def run(
     rig: Annotated[Path, typer.Argument(help="Rig file (TOML).")],
     duration: Annotated[
-        float | None, typer.Option(help="End by itself after this many seconds.", min=0.1)
+        float | None,
+        typer.Option(help="End by itself after this many seconds.", min=0.1, max=LONGEST_S),
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Write lines instead of a view.")] = False,
     report: Annotated[Path | None, typer.Option(help="Leave figures and report.json here.")] = None,
@@ -58,8 +61,10 @@ def run(
     default_core()  # before any process starts: what it lacks, all of them would
     text = read_text(rig)
     loaded = parse_rig(text, rig)
-    if record is not None and record.exists():
-        raise UsageError(f"{record} is already there: recordings are never overwritten")
+    if record is not None:
+        check_new_recording(record)
+    if report is not None:
+        check_folder(report)
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
     recording = record or loaded.record.directory / f"{stamp}.mcap"
     if lockstep:

@@ -73,7 +73,7 @@ def solve(
 ) -> None:
     """Solve every frame of a folder on its own, lost in space.
 
-    Example: groundstation star-tracker solve recordings/ceiling --out answers.csv
+    Example: groundstation star-tracker solve try/ceiling --out answers.csv
     """
     cv2.setNumThreads(1)
     check_targets(out)

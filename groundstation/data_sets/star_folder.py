@@ -75,4 +75,10 @@ def load_sky(folder: Path) -> tuple[CameraCalibration, StarCatalogue]:
     """
     if not folder.is_dir():
         raise FileError(f"{folder}: no such folder.")
-    return CameraCalibration.load(folder / "camera.json"), StarCatalogue.load(folder / "ceiling.csv")
+    camera, ceiling = CameraCalibration.load(folder / "camera.json"), folder / "ceiling.csv"
+    catalogue = StarCatalogue.load(ceiling)
+    try:
+        catalogue.check_in_view(camera, str(ceiling))
+    except ValueError as error:
+        raise FileError(f"{error}") from error
+    return camera, catalogue

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
+from groundstation.files.reading import text_of
+
 T = TypeVar("T")
 
 
@@ -43,12 +45,9 @@ class RigFile:
         """The file as text.
 
         Raises:
-            ValueError: It is not UTF-8.
+            FileError: It is no text.
         """
-        try:
-            return self.data.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise ValueError(f"{self.path}: is not UTF-8 text ({error})") from error
+        return text_of(self.data, self.path)
 
     def __repr__(self) -> str:
         return f"RigFile({str(self.path)!r}, sha256 {self.sha256[:8]})"

@@ -4,11 +4,11 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-MOST = 1e9
-"""Largest amount of any number of a rig: squares and products of such numbers are finite still."""
+from groundstation.files.amounts import UNITLESS, check_amounts
+
 LEAST = 1e-9
-Positive = Annotated[float, Field(gt=0, le=MOST)]
-NonNegative = Annotated[float, Field(ge=0, le=MOST)]
+Positive = Annotated[float, Field(gt=0, le=UNITLESS)]
+NonNegative = Annotated[float, Field(ge=0, le=UNITLESS)]
 Sigma = Annotated[float, Field(ge=LEAST, le=10.0)]
 """A standard deviation in m, rad or m/s^2: beyond these bounds it is a mistake, and ends in overflows."""
 Delay = Annotated[float, Field(ge=0, le=10.0)]
@@ -16,14 +16,11 @@ Delay = Annotated[float, Field(ge=0, le=10.0)]
 
 
 class Section(BaseModel):
-    """A table of the rig file: unknown keys, infinities, NaN and numbers beyond ``MOST`` are refused."""
+    """A table of the rig file: unknown keys, infinities, NaN and what its unit cannot mean are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
 
     @model_validator(mode="after")
     def _is_moderate(self) -> Self:
-        for key in type(self).model_fields:
-            value = getattr(self, key)
-            if isinstance(value, float) and abs(value) > MOST:
-                raise ValueError(f"'{key}' is {value:g}: expected at most {MOST:g}")
+        check_amounts({key: getattr(self, key) for key in type(self).model_fields})
         return self

@@ -1,5 +1,5 @@
 """What a file that cannot be used raises."""
 
+from drivers.files.errors import FileError
 
-class FileError(ValueError):
-    """A file is missing, torn or states something impossible; the message is one sentence naming it."""
+__all__ = ["FileError"]

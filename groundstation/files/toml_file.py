@@ -3,29 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from pathlib import Path
-from typing import Any
 
-from groundstation.files.errors import FileError
-from groundstation.files.reading import text_of
+from drivers.files.trees import parse_toml, toml_of
+
+__all__ = ["parse_toml", "toml_lines", "toml_of", "toml_table", "toml_value"]
 
 Scalar = float | int | str | bool | datetime
 Value = Scalar | Sequence["Value"]
-
-
-def parse_toml(data: bytes, path: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises:
-        FileError: It is no text or no TOML.
-    """
-    try:
-        return tomllib.loads(text_of(data, path))
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{path}: is not valid TOML: {error}.") from error
 
 
 def toml_value(value: Value) -> str:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+_MOST_SHOWN = 80
+
 
 def number(values: Mapping[str, Any], key: str, name: str | None = None) -> float:
     """Return a finite number; ``name`` is what messages call it.
@@ -15,7 +17,7 @@ def number(values: Mapping[str, Any], key: str, name: str | None = None) -> floa
     if key not in values:
         raise ValueError(f"{name} is missing")
     if not _is_finite(values[key]):
-        raise ValueError(f"{name} must be a finite number, found {values[key]!r}")
+        raise ValueError(f"{name} must be a finite number, found {_shown(values[key])}")
     return float(values[key])
 
 
@@ -42,9 +44,35 @@ def numbers(values: Mapping[str, Any], key: str, count: int, name: str | None = 
         raise ValueError(f"{name} is missing")
     value = values[key]
     if not isinstance(value, list) or len(value) != count or not all(map(_is_finite, value)):
-        raise ValueError(f"{name} must be a list of {count} finite numbers, found {value!r}")
+        raise ValueError(f"{name} must be a list of {count} finite numbers, found {_shown(value)}")
     return tuple(float(item) for item in value)
 
 
+def check_amount(name: str, value: float, most: float, hint: str = "") -> None:
+    """Refuse a number that nobody can mean.
+
+    Args:
+        name: What messages call it.
+        value: The number.
+        most: Its largest amount.
+        hint: What may be wrong.
+
+    Raises:
+        ValueError: It is larger.
+    """
+    if not abs(value) <= most:
+        raise ValueError(f"{name} is {value:g}, expected at most {most:g}{f' ({hint})' if hint else ''}")
+
+
 def _is_finite(value: object) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _MOST_SHOWN else f"{text[: _MOST_SHOWN - 3]}..."

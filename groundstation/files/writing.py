@@ -16,15 +16,39 @@ def check_targets(*paths: Path | None) -> None:
     """Refuse targets that cannot be written before any work is done.
 
     Raises:
-        FileError: A folder does not exist, or a target is one.
+        FileError: A folder does not exist or is not ours to write in, a name is too long, or a target is
+            a folder or a device.
     """
     for path in paths:
         if path is None:
             continue
-        if not path.parent.is_dir():
-            raise FileError(f"{path}: cannot be written, there is no folder {path.parent}.")
-        if path.is_dir():
-            raise FileError(f"{path}: cannot be written, it is a folder.")
+        try:
+            if path.is_dir():
+                raise FileError(f"{path}: cannot be written, it is a folder.")
+            if not path.parent.is_dir():
+                raise FileError(f"{path}: cannot be written, there is no folder {path.parent}.")
+            if path.exists() and not path.is_file():
+                raise FileError(f"{path}: cannot be written, it is no file.")
+        except OSError as error:
+            raise FileError(f"{path}: cannot be written ({error.strerror or error}).") from error
+        if not os.access(path.parent, os.W_OK):
+            raise FileError(f"{path}: cannot be written, the folder may not be written in.")
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder that cannot be made or written in, before any work is done; its parents are made, too.
+
+    Raises:
+        FileError: Something of its path is no folder, is not ours to write in, or is too long.
+    """
+    try:
+        there = next((each for each in (path, *path.parents) if each.exists()), path)
+    except OSError as error:
+        raise FileError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
+    if not there.is_dir():
+        raise FileError(f"{path}: no such folder can be made, {there} is none.")
+    if not os.access(there, os.W_OK):
+        raise FileError(f"{path}: no such folder can be made, {there} may not be written in.")
 
 
 def write_files(contents: Mapping[Path, Content]) -> None:
@@ -39,18 +63,18 @@ def write_files(contents: Mapping[Path, Content]) -> None:
     parts: dict[Path, Path] = {}
     path = Path()
     try:
-        for path, content in contents.items():
-            parts[path] = path.with_name(f".{path.name}.{os.getpid()}.part")
+        for number, (path, content) in enumerate(contents.items()):
+            parts[path] = path.with_name(f".{os.getpid()}_{number}.part")  # short, as long as the name may be
             with parts[path].open("wb") as file:
                 if isinstance(content, bytes):
                     file.write(content)
                 else:
-                    file.writelines(
-                        line.encode() for line in ([content] if isinstance(content, str) else content)
-                    )
+                    file.writelines(map(_utf8, [content] if isinstance(content, str) else content))
         for path in parts:
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if path.exists() and not path.is_file():  # a device or a pipe would be replaced by a file
+                raise OSError(errno.EINVAL, "it is no file")
         for path, part in parts.items():
             os.replace(part, path)  # noqa: PTH105 - the call that promises atomicity
     except OSError as error:
@@ -58,6 +82,14 @@ def write_files(contents: Mapping[Path, Content]) -> None:
     finally:
         for part in parts.values():
             part.unlink(missing_ok=True)
+
+
+def _utf8(text: str) -> bytes:
+    """Encode; names of files that the locale could not decode are decoded as UTF-8."""
+    try:
+        return text.encode()
+    except UnicodeEncodeError:
+        return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
 def write_file(path: Path, content: Content) -> None:
@@ -81,7 +113,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     try:
         if path.exists() and not path.is_dir():
             raise FileExistsError(errno.EEXIST, "a file is in its place")
-        made = tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.")
+        path.exists()  # a name that is too long is refused before any work is done
+        made = tempfile.TemporaryDirectory(dir=path.parent, prefix=".part.")
     except OSError as error:
         raise FileError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
     with made as unfinished:

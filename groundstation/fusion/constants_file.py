@@ -75,7 +75,7 @@ def parse_constants(data: bytes, path: Path) -> Constants:
             raise FileError(f"{path}: {key} must be finite with a std above zero.")
         if table.get("unit") != UNITS[name]:
             raise FileError(
-                f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r}."
+                f"{path}: {key} must be in the unit {UNITS[name]!r}, found {table.get('unit')!r:.80}."
             )
         found[name] = (value, sigma)
     if not found:
@@ -88,6 +88,9 @@ def parse_constants(data: bytes, path: Path) -> Constants:
 
 def _number(path: Path, key: str, table: dict[str, object], part: str) -> float:
     value = table.get(part)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FileError(f"{path}: {key}.{part} must be a number, found {value!r}.")
-    return float(value)
+    try:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return float(value)  # NaN is what a calibration writes that could not determine it
+    except OverflowError:
+        pass  # a whole number of hundreds of digits
+    raise FileError(f"{path}: {key}.{part} must be a number, found {value!r:.80}.")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
 from groundstation.files.toml_file import parse_toml, toml_lines, toml_table
+from groundstation.files.values import number, numbers, whole_number
 from groundstation.files.writing import write_files
 
 Array = NDArray[np.float64]
@@ -211,25 +212,31 @@ class TableMap:
             raise
         except KeyError as error:
             raise FileError(f"{path}: key {error.args[0]} is missing.") from error
-        except (TypeError, ValueError) as error:
-            raise FileError(f"{path}: {error}.") from error
+        except (ArithmeticError, AttributeError, IndexError, TypeError, ValueError) as error:
+            raise FileError(f"{path}: {error!s:.200}.") from error
 
     @classmethod
     def _from(cls, text: dict[str, Any], grids: dict[str, Array]) -> TableMap:
         grid, mean = text["grid"], text["mean"]
+        x_m_s2, y_m_s2 = numbers(mean["acceleration"], "value", 2, "mean.acceleration.value")
+        rows = mean["covariance"]["value"]
+        covariance = [numbers({"value": row}, "value", 2, "mean.covariance.value") for row in rows]
+        shape = whole_number(grid, "rows"), whole_number(grid, "columns")
+        if shape != grids["ax_m_s2"].shape:
+            raise ValueError(f"its grid is {grids['ax_m_s2'].shape}, it states {shape}")
         return cls(
-            x_min_m=float(grid["x_min_m"]),
-            y_min_m=float(grid["y_min_m"]),
-            step_m=float(grid["step_m"]),
+            x_min_m=number(grid, "x_min_m"),
+            y_min_m=number(grid, "y_min_m"),
+            step_m=number(grid, "step_m"),
             **grids,
-            mean_m_s2=(float(mean["acceleration"]["value"][0]), float(mean["acceleration"]["value"][1])),
-            mean_covariance_m2_s4=np.array(mean["covariance"]["value"], dtype=np.float64).reshape(2, 2),
-            far_sigma_m_s2=float(text["unvisited_std"]["value"]),
+            mean_m_s2=(x_m_s2, y_m_s2),
+            mean_covariance_m2_s4=np.array(covariance).reshape(2, 2),
+            far_sigma_m_s2=number(text["unvisited_std"], "value", "unvisited_std.value"),
             provenance=MapProvenance(
                 text["made_utc"].astimezone(UTC),
                 {row["name"]: row["sha256"] for row in text["recordings"]},
-                float(text["residual"]["chi_square_ratio"]["value"]),
-                float(text["flown"]["value"]),
+                number(text["residual"]["chi_square_ratio"], "value", "residual.chi_square_ratio.value"),
+                number(text["flown"], "value", "flown.value"),
                 dict(text.get("notes", {})),
             ),
         )

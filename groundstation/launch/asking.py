@@ -13,7 +13,7 @@ from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.listener import Listener
 from groundstation.bus.record_stream import RecordWriter
-from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.bus.zenoh_bus import HubError, ZenohBus
 from groundstation.declarations.errors import GroundStationError
 from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request, Value
@@ -42,7 +42,7 @@ def session_with(endpoint: str) -> Iterator[ZenohBus]:
     try:
         with ZenohBus(endpoint) as bus:
             yield bus
-    except zenoh.ZError as error:
+    except (zenoh.ZError, HubError) as error:
         raise GroundStationError(f"the rig at {endpoint} does not let us in: {error}") from error
 
 

@@ -23,7 +23,7 @@ def run_beside(rig: Rig, endpoint: str, name: str, node: Node, is_done: Callable
         is_done: Asked after each of its ticks.
 
     Raises:
-        zenoh.ZError: The hub is not there.
+        HubError: The hub is not there.
     """
     process = f"{name}_{os.getpid()}"
     journal, sequences = JournalWriter(), Sequences()

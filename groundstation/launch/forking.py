@@ -95,7 +95,7 @@ def _become(request: int, stdin: int, stderr: int) -> None:
     pickled = Path(f"/proc/self/fd/{request}").read_bytes()  # by this name it is read from its beginning
     _close_but(None)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115 the old one may have read ahead
-    sys.stdout = sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115 open to the end
+    sys.stdout = sys.stderr = open(2, "w", 1, "utf-8", "surrogateescape", closefd=False)  # noqa: SIM115 open to the end
     for number in (signal.SIGHUP, signal.SIGTSTP):
         signal.signal(number, signal.SIG_DFL)
     name, target, arguments = pickle.loads(pickled)

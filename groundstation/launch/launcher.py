@@ -14,8 +14,6 @@ from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 
-import zenoh
-
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError
@@ -33,6 +31,7 @@ from groundstation.launch.urgency import going_first
 from groundstation.rig.plan import processes_of
 from groundstation.rig.read import bytes_of
 
+LOOPBACK_S = 2.0
 START_S = 30.0
 """A process that is not ready by then never will be."""
 HOPELESS = 4  # restarts of a process that was never ready
@@ -238,7 +237,8 @@ class Launcher:
             rig_text=self._rig_text,
             files=self._files,
             endpoint=self.endpoint,
-            recording=None if self._recording is None else _numbered(self._recording, child.restarts),
+            recording=self._recording,
+            restarts=child.restarts,
             utc_offset_ns=time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns(),
             sequences_after=round(elapsed_s * SEQUENCES_PER_S) if child.restarts else 0,
         )
@@ -301,15 +301,25 @@ def _raise_refusal(child: Child) -> None:
 
 
 def _open_hub() -> tuple[str, ZenohBus]:
-    """The hub on a free port of loopback."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    """The hub on a free port of loopback.
+
+    Raises:
+        GroundStationError: There is no loopback, or somebody took the port in between.
+    """
     try:
-        with going_first():  # its threads, which pass on everybody's messages
-            return endpoint, ZenohBus(endpoint, is_hub=True)
-    except zenoh.ZError as error:  # somebody took the port in between
-        raise GroundStationError(f"the hub cannot be opened at {endpoint}: {error}") from error
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            address = probe.getsockname()
+            probe.listen()
+            socket.create_connection(address, timeout=LOOPBACK_S).close()
+    except OSError as error:
+        raise GroundStationError(
+            f"this machine does not reach itself at 127.0.0.1 ({error.strerror or error}): "
+            "is its loopback interface up? (ip link set lo up)"
+        ) from error
+    endpoint = f"tcp/127.0.0.1:{address[1]}"
+    with going_first():  # its threads, which pass on everybody's messages
+        return endpoint, ZenohBus(endpoint, is_hub=True)
 
 
 def _package_of(name: str) -> str:
@@ -318,8 +328,3 @@ def _package_of(name: str) -> str:
         known = ", ".join(sorted(found)) or "none"
         raise RigError(f"laboratory.name: {name!r} is not installed (installed: {known})")
     return found[name].module.partition(".")[0]
-
-
-def _numbered(recording: Path, restarts: int) -> Path:
-    """A recorder that starts again writes a file of its own: nothing recorded is overwritten."""
-    return recording if restarts == 0 else recording.with_stem(f"{recording.stem}_{restarts}")

@@ -1,12 +1,14 @@
 """A whole lockstep run of a rig into a recording, in virtual time."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.launch.recorder import in_a_sentence
+from groundstation.launch.recorder_pause import SPARE_BYTES
 from groundstation.parts.operation.messages import Latency
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
@@ -63,7 +65,7 @@ def run_lockstep(
     info = recording_info(rig, rig_text, rig_path, seed, utc_offset_ns=None)
     faults = FaultSummary(tuple(rig.vehicles), 0)
     try:
-        recorder = Recorder(recording, info)
+        recorder = Recorder(recording, info, spare_bytes=SPARE_BYTES)
     except RecordingError as error:
         raise UsageError(str(error)) from error
     try:
@@ -74,12 +76,18 @@ def run_lockstep(
         if isinstance(error, RigError):
             raise RigError(f"{rig_path}: {error}") from error
         raise
-    with in_a_sentence(recorder), recorder:
-        try:
-            runner.run(
-                round(duration_s * 1e9),
-                lambda now_ns: progress(f"{now_ns * 1e-9:.1f} s of {duration_s:g} s", now_ns * 1e-9),
-            )
-        finally:
-            runner.close()
+    try:
+        with in_a_sentence(recorder):
+            try:
+                runner.run(
+                    round(duration_s * 1e9),
+                    lambda now_ns: progress(f"{now_ns * 1e-9:.1f} s of {duration_s:g} s", now_ns * 1e-9),
+                )
+            finally:
+                runner.close()
+            recorder.finish()
+    except BaseException:
+        with suppress(RecordingError):  # then what is there can be recovered
+            recorder.end_early()
+        raise
     return faults

@@ -57,7 +57,7 @@ def claim_memory(rig_path: Path, *, is_emulated: bool) -> Memory:
     base = os.environ.get("XDG_STATE_HOME", "")
     state = Path(base) if base and Path(base).is_absolute() else Path.home() / ".local" / "state"
     path = rig_path.resolve()
-    name = f"{path.stem}-{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    name = f"{path.stem}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:12]}"
     for number in range(MOST_RUNS if is_emulated else 1):
         folder = state / "groundstation" / (f"{name}-{number}" if number else name)
         found = _claim(folder)

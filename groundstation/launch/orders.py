@@ -20,7 +20,8 @@ class Orders:
         files: Every file that the rig names, by absolute path, as it was when the run began: what flew is
             what was hashed.
         endpoint: Of the hub.
-        recording: Path of the recording; used by the recorder.
+        recording: Path of the first recording of the run; used by the recorder.
+        restarts: How often the process was started before: a recorder then writes a file of its own.
         utc_offset_ns: UTC minus monotonic clock; used by the recorder.
         sequences_after: Sequence numbers begin after this one.
     """
@@ -31,6 +32,7 @@ class Orders:
     endpoint: str
     files: dict[str, bytes] = field(default_factory=dict, repr=False)
     recording: Path | None = None
+    restarts: int = 0
     utc_offset_ns: int = 0
     sequences_after: int = 0
 

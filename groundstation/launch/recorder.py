@@ -5,7 +5,7 @@ import queue
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
@@ -14,8 +14,8 @@ from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.message import Message
 from groundstation.launch.orders import Orders
 from groundstation.launch.process import NICENESS, obey, stop_when_asked
+from groundstation.launch.recorder_pause import ALIVE_PERIOD_NS, SPARE_BYTES, Pause, next_name
 from groundstation.launch.recorder_reporter import RecorderReporter
-from groundstation.parts.operation.messages import RecorderStatus
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.writer import Recorder
@@ -23,9 +23,6 @@ from groundstation.rig.provenance import recording_info
 from groundstation.rig.read import parse_rig
 
 TICK_S = 0.05
-ALIVE_PERIOD_NS = 1_000_000_000
-SPARE_BYTES = 1 << 20
-"""Kept free on the disk beside what is left to write: half a second of two mock-ups and of others."""
 
 
 def main(orders: Orders) -> None:
@@ -36,12 +33,12 @@ def main(orders: Orders) -> None:
 def run(orders: Orders) -> None:
     """Record until asked to stop; what is still in the queue then is written too.
 
-    A disk that is full ends the recording, not the process: nobody starts it again in vain, and the flight
-    is told by the silence of ``RecorderStatus``.
+    A disk that is full ends a file, not the process: the flight is told, and recording goes on in another
+    file when there is room again.
 
     Raises:
         UsageError: The file cannot be begun.
-        GroundStationError: It could not be written to the end: the disk is full, or gone.
+        GroundStationError: Something was not recorded: the disk was full, or gone.
     """
     assert orders.recording is not None
     os.nice(NICENESS)
@@ -49,49 +46,36 @@ def run(orders: Orders) -> None:
     info = recording_info(rig, orders.rig_text, orders.rig_path, None, orders.utc_offset_ns)
     batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     stop_when_asked(lambda: batches.put(None))
-    recorder = _begin(orders.recording, info)
-    with ZenohBus(orders.endpoint) as bus:
+    with ZenohBus(orders.endpoint) as bus:  # first: without a hub no file is begun
+        recorder = _begin(next_name(orders.recording) if orders.restarts else orders.recording, info)
         reporter = RecorderReporter(recorder, bus, orders.process, orders.sequences_after)
         bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
         reporter.look(time.monotonic_ns())
         bus.announce(orders.process)
-        try:
-            with in_a_sentence(recorder):
-                write_until_end(recorder, batches, bus, orders.process, rig.tables.payloads, reporter)
-                recorder.finish()
-        except GroundStationError as error:
-            trouble = f"{error} {_end_early(recorder, is_whole=isinstance(error.__cause__, _NoRoomError))}"
-            sys.stderr.write(trouble + "\n")
+        trouble = ""
+        while True:
+            is_over = False
+            try:
+                with in_a_sentence(recorder):
+                    write_until_end(recorder, batches, bus, orders.process, rig.tables.payloads, reporter)
+                    is_over = True
+                    recorder.finish()
+                break
+            except GroundStationError as error:
+                pause, reason = Pause(recorder, orders.recording, info), str(error)
+            sys.stderr.write(f"{reason} {pause.words()}\n")
             sys.stderr.flush()
-            live_on(batches, bus, orders.process)
-            raise GroundStationError(trouble) from error
-
-
-class _NoRoomError(RecordingError):
-    """The disk is nearly full; what was written so far is whole."""
-
-
-def _end_early(recorder: Recorder, *, is_whole: bool) -> str:
-    """Finish a file that cannot be written any further if that is possible; what is there, in words."""
-    if is_whole:
-        with suppress(RecordingError):
-            return f"{recorder.finish()} is complete up to here"
-    return f"groundstation recording recover brings back what {recorder.part_path} holds"
-
-
-def live_on(batches: "queue.SimpleQueue[bytes | None]", bus: ZenohBus, process: str) -> None:
-    """Take what comes and forget it until the queue holds None; the others go on."""
-    sign_due_ns = 0
-    while True:
-        now_ns = time.monotonic_ns()
-        if now_ns >= sign_due_ns:
-            sign_due_ns = now_ns + ALIVE_PERIOD_NS
-            bus.publish_batch(process, RecordWriter().take())
-        try:
-            if batches.get(timeout=ALIVE_PERIOD_NS * 1e-9) is None:
-                return
-        except queue.Empty:
-            continue
+            reporter.stall()
+            following = None if is_over else pause.wait(batches, bus, orders.process, reporter)
+            trouble = f"{reason} {pause.words()}"  # it may have become whole meanwhile
+            if following is None:
+                break
+            recorder = following
+            reporter.go_on(recorder)
+            sys.stderr.write(f"recording goes on in {recorder.path}\n")
+            sys.stderr.flush()
+        if trouble:
+            raise GroundStationError(trouble)
 
 
 @contextmanager
@@ -109,7 +93,7 @@ def in_a_sentence(recorder: Recorder) -> Iterator[None]:
 
 def _begin(path: Path, info: RecordingInfo) -> Recorder:
     try:
-        return Recorder(path, info)
+        return Recorder(path, info, spare_bytes=SPARE_BYTES)
     except RecordingError as error:
         raise UsageError(str(error)) from error
 
@@ -125,7 +109,7 @@ def write_until_end(
     """Write until the queue holds None.
 
     Raises:
-        OSError: The disk is full, or gone; with a reporter while there is still room to finish the file.
+        RecordingError: The disk is full, or gone; with a reporter while there is room to finish the file.
     """
     sign_due_ns = 0
     while True:
@@ -134,7 +118,9 @@ def write_until_end(
             sign_due_ns = now_ns + ALIVE_PERIOD_NS
             bus.publish_batch(process, RecordWriter().take())
         if reporter is not None:
-            _check_room(recorder, reporter.look(now_ns))
+            status = reporter.look(now_ns)
+            if status is not None:
+                recorder.check_room(status.free_bytes)
         try:
             batch = batches.get(timeout=TICK_S)
         except queue.Empty:
@@ -150,9 +136,3 @@ def write_until_end(
         unknown = recorder.record_batch(entries, payloads)
         if unknown:
             sys.stderr.write(f"not recorded: {unknown} messages of topics that no part declares\n")
-
-
-def _check_room(recorder: Recorder, status: RecorderStatus | None) -> None:
-    """End in time: the index that makes it a finished recording needs room, too."""
-    if status is not None and status.free_bytes < recorder.rest_bytes + SPARE_BYTES:
-        raise _NoRoomError(f"{recorder.part_path} cannot be written any further: the disk is full")

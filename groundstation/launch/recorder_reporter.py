@@ -1,7 +1,6 @@
 """What the recorder reports of itself: how much it has written, and how long its disk lasts."""
 
 import math
-import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -12,16 +11,10 @@ from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.parts.operation.messages import RecorderStatus
-from groundstation.recording.writer import Recorder
+from groundstation.recording.writer import Recorder, free_bytes
 
 PERIOD_NS = 500_000_000
 RATE_WINDOW_NS = 10_000_000_000
-
-
-def free_bytes(path: Path) -> int:
-    """On the disk of a file, for whoever is not root."""
-    found = os.statvfs(path.parent)
-    return found.f_bavail * found.f_frsize
 
 
 class RecorderReporter:
@@ -49,7 +42,20 @@ class RecorderReporter:
         self._sequence = sequences_after
         self._free = free
         self._due_ns = 0
+        self._is_stalled = False
         self._written: deque[tuple[int, int]] = deque()
+
+    def stall(self) -> None:
+        """Report from now on that there is no room at all."""
+        self._is_stalled = True
+        self._due_ns = 0
+
+    def go_on(self, recorder: Recorder) -> None:
+        """Report of another file."""
+        self._recorder = recorder
+        self._is_stalled = False
+        self._written.clear()
+        self._due_ns = 0
 
     def look(self, now_ns: int) -> RecorderStatus | None:
         """Publish if it is due; what was published."""
@@ -72,8 +78,8 @@ class RecorderReporter:
         while now_ns - self._written[0][0] > RATE_WINDOW_NS:
             self._written.popleft()
         first_ns, first = self._written[0]
-        room_s = math.inf
-        if written > first:
+        room_s = 0.0 if self._is_stalled else math.inf
+        if written > first and not self._is_stalled:
             left = max(0, free - self._recorder.rest_bytes)
             room_s = left * (now_ns - first_ns) * 1e-9 / (written - first)
         return RecorderStatus(now_ns, "", str(self._recorder.part_path), written, free, room_s)

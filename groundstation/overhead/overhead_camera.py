@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
-from groundstation.files.values import number, numbers, whole_number
+from groundstation.files.values import check_amount, number, numbers, whole_number
 from groundstation.frames import turned_axes
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
 _SIDES = ("width", "height")
 _SINGLE = ("fx", "fy", "cx", "cy", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
+_MOST_PX, _MOST_DISTORTION, _FARTHEST_M, _MOST_ANGLE_RAD = 1e5, 100.0, 100.0, 7.0
 _LISTS = ("dist_k1_k2_p1_p2_k3", "position_table_m")
 
 
@@ -62,6 +63,14 @@ class OverheadCamera:
         for key in ("width", "height", "fx", "fy"):
             if not getattr(self, key) > 0:
                 raise ValueError(f"key '{key}' must be positive, not {getattr(self, key)}")
+        for key in ("width", "height", "fx", "fy", "cx", "cy"):
+            check_amount(f"key '{key}'", getattr(self, key), _MOST_PX)
+        for value in self.distortion:
+            check_amount("key 'dist_k1_k2_p1_p2_k3'", value, _MOST_DISTORTION)
+        for value in self.position_table_m:
+            check_amount("key 'position_table_m'", value, _FARTHEST_M, "is it in mm?")
+        for key in ("yaw_rad", "tilt_x_rad", "tilt_y_rad"):
+            check_amount(f"key '{key}'", getattr(self, key), _MOST_ANGLE_RAD, "is it in degrees?")
         if not self.position_table_m[2] > 0.0:
             raise ValueError("key 'position_table_m' must put the camera above the table (z > 0)")
         if not self.table_from_camera()[2, 2] < 0.0:

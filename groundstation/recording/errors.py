@@ -3,3 +3,7 @@
 
 class RecordingError(Exception):
     """A recording cannot be read, written or replayed as asked."""
+
+
+class NoRoomError(RecordingError):
+    """The disk of a recording is nearly full; what was written so far is whole."""

@@ -79,9 +79,10 @@ class McapFile:
     def add_metadata(self, name: str, entries: dict[str, str]) -> None:
         """Write a metadata record."""
         record = _packed(Metadata(name=name, metadata=entries))
-        self._summary_bytes += 64 + len(name)
-        self._metadata.append(MetadataIndex(offset=self._file.tell(), length=len(record), name=name))
+        index = MetadataIndex(offset=self._file.tell(), length=len(record), name=name)
         self._file.write(record)
+        self._summary_bytes += 64 + len(name)
+        self._metadata.append(index)
 
     def add_schema(self, name: str, encoding: str, text: bytes) -> int:
         """Add a schema; return its number."""
@@ -115,11 +116,19 @@ class McapFile:
         self._finish_chunk()
         self._file.flush()
 
+    def drop_open_chunk(self) -> int:
+        """Forget the messages that are not written yet; return how many they are."""
+        dropped = sum(len(index) // 2 for index in self._stamps_and_offsets.values())
+        self._parts.clear()
+        self._stamps_and_offsets.clear()
+        self._size = 0
+        return dropped
+
     def finish(self) -> None:
         """Write the rest, the summary and the end of the file."""
         self._finish_chunk()
-        self._file.write(_packed(DataEnd(0)))
-        start = self._file.tell()
+        end = _packed(DataEnd(0))
+        start = self._file.tell() + len(end)
         summary, offsets = b"", b""
         for opcode, records in self._summary():
             group = b"".join(map(_packed, records))
@@ -128,7 +137,8 @@ class McapFile:
         offset_start = start + len(summary)
         footer = _FOOTER_CRC.pack(Opcode.FOOTER, 20, start, offset_start)
         crc = zlib.crc32(footer, zlib.crc32(summary + offsets))
-        self._file.write(summary + offsets + _packed(Footer(start, offset_start, crc)) + MAGIC)
+        # one piece, like a chunk with its indexes: a disk that is full takes all of it or nothing
+        self._file.write(end + summary + offsets + _packed(Footer(start, offset_start, crc)) + MAGIC)
 
     def _summary(self) -> Iterable[tuple[Opcode, Iterable[_Record]]]:
         yield Opcode.SCHEMA, self._schemas
@@ -167,21 +177,21 @@ class McapFile:
         high_ns = max(max(index[::2]) for index in self._stamps_and_offsets.values())
         start = self._file.tell()
         length = _CHUNK.size + len(packed)
-        self._file.write(
-            _CHUNK.pack(
-                Opcode.CHUNK,
-                length - RECORD.size,
-                low_ns,
-                high_ns,
-                len(records),
-                zlib.crc32(records),
-                len(_COMPRESSION),
-                _COMPRESSION.encode(),
-                len(packed),
-            )
+        head = _CHUNK.pack(
+            Opcode.CHUNK,
+            length - RECORD.size,
+            low_ns,
+            high_ns,
+            len(records),
+            zlib.crc32(records),
+            len(_COMPRESSION),
+            _COMPRESSION.encode(),
+            len(packed),
         )
-        self._file.write(packed)
-        offsets, indexes = self._write_indexes(start + length)
+        offsets, indexes = self._packed_indexes(start + length)
+        self._file.write(b"".join((head, packed, indexes)))
+        for channel, index in self._stamps_and_offsets.items():
+            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
         self._chunks.append(
             ChunkIndex(
                 chunk_length=length,
@@ -189,7 +199,7 @@ class McapFile:
                 compression=_COMPRESSION,
                 compressed_size=len(packed),
                 message_end_time=high_ns,
-                message_index_length=indexes,
+                message_index_length=len(indexes),
                 message_index_offsets=offsets,
                 message_start_time=low_ns,
                 uncompressed_size=len(records),
@@ -200,17 +210,15 @@ class McapFile:
         self._stamps_and_offsets.clear()
         self._size = 0
 
-    def _write_indexes(self, position: int) -> tuple[dict[int, int], int]:
-        """Where the index of each channel lies, and the length of all."""
+    def _packed_indexes(self, position: int) -> tuple[dict[int, int], bytearray]:
+        """Where the index of each channel lies, and all of them."""
         offsets, out = {}, bytearray()
         for channel, index in self._stamps_and_offsets.items():
             offsets[channel] = position + len(out)
             size = 8 * len(index)
             out += _INDEX.pack(Opcode.MESSAGE_INDEX, 6 + size, channel, size)
             out += struct.pack(f"<{len(index)}Q", *index)
-            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
-        self._file.write(out)
-        return offsets, len(out)
+        return offsets, out
 
 
 def _packed(record: _Record) -> bytes:

@@ -33,6 +33,7 @@ class Opcode(IntEnum):
     CHANNEL = 0x04
     MESSAGE = 0x05
     CHUNK = 0x06
+    CHUNK_INDEX = 0x08
     METADATA = 0x0C
     DATA_END = 0x0F
 
@@ -120,6 +121,12 @@ def complete_records(data: bytes | mmap, position: int = 0) -> Iterator[Record]:
         if position > end or opcode == 0:
             return
         yield Record(opcode, start, position)
+
+
+def read_chunk_start(content: bytes) -> int:
+    """Where a chunk begins, from the content of its record in the index."""
+    start: int = _U64.unpack_from(content, 16)[0]
+    return start
 
 
 def read_chunk(content: bytes) -> Chunk | None:

@@ -1,11 +1,14 @@
 """Recovery of a recording whose recorder was killed: all that can be read goes into a new, indexed file.
 
 The file is walked from the front. Complete chunks are unpacked; of the chunk at the torn end, the blocks
-that its compressor had finished are unpacked too. A damaged chunk in the middle is counted and skipped.
+that its compressor had finished are unpacked too. A damaged chunk is counted and skipped, and so are bytes
+that are no record, wherever they lie: behind them the next record is searched.
 """
 
 import mmap
+import os
 import struct
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -15,7 +18,9 @@ from groundstation.recording.errors import RecordingError
 from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata, to_metadata
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
+from groundstation.recording.resync import Lost, walk
 from groundstation.recording.software import software
+from groundstation.recording.writer import check_new_recording
 
 
 @dataclass(slots=True)
@@ -25,6 +30,7 @@ class Recovery:
     Attributes:
         messages: Messages brought over.
         torn_bytes: Bytes at the end of the file that are no whole record.
+        lost_bytes: Bytes elsewhere that are no record.
         damaged_chunks: Chunks, the torn one included, that could not be unpacked; their messages are lost.
         orphans: Messages lost because the name of their channel stood in a damaged chunk.
         was_finished: The file had been finished properly.
@@ -34,6 +40,7 @@ class Recovery:
 
     messages: int = 0
     torn_bytes: int = 0
+    lost_bytes: int = 0
     damaged_chunks: int = 0
     orphans: int = 0
     was_finished: bool = False
@@ -51,14 +58,13 @@ def recover(source: Path, target: Path) -> Recovery:
     Raises:
         RecordingError: The source cannot be read or is no MCAP file, or the target is already there.
     """
-    if target.exists():
-        raise RecordingError(f"{target} is already there: recordings are never overwritten")
-    temporary = target.with_name(target.name + ".recovering")
+    check_new_recording(target)
+    temporary = target.with_name(f".{os.getpid()}.recovering")
     try:
         with source.open("rb") as file:
             data = _mapped(file, source)
             with data, temporary.open("wb") as out:
-                recovery = _Copy(data, out).run()
+                recovery = _Copy(data, out, source).run()
             temporary.replace(target)
     except OSError as error:
         raise RecordingError(f"{error.filename or target}: {error.strerror}") from error
@@ -68,7 +74,7 @@ def recover(source: Path, target: Path) -> Recovery:
 
 
 def _mapped(file: BinaryIO, source: Path) -> mmap.mmap:
-    if file.read(len(records.MAGIC)) != records.MAGIC:
+    if len(file.read(len(records.MAGIC))) < len(records.MAGIC):
         raise RecordingError(f"{source} is no MCAP file, or was torn before its first record")
     return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
@@ -76,15 +82,21 @@ def _mapped(file: BinaryIO, source: Path) -> mmap.mmap:
 class _Copy:
     """Carries records over; numbers of schemas and channels are given anew."""
 
-    def __init__(self, data: mmap.mmap, out: BinaryIO) -> None:
+    def __init__(self, data: mmap.mmap, out: BinaryIO, source: Path) -> None:
         self._data = data
-        self._whole = list(records.complete_records(data, len(records.MAGIC)))
+        is_mcap = data[: len(records.MAGIC)] == records.MAGIC
+        self._pieces = list(walk(data, len(records.MAGIC) if is_mcap else 0))
+        self._whole = [piece for piece in self._pieces if isinstance(piece, records.Record)]
+        if not (is_mcap or self._whole):
+            raise RecordingError(f"{source} is no MCAP file, or was torn before its first record")
         profile = "ros2"
         if self._whole and self._whole[0].opcode == Opcode.HEADER:
-            profile, _ = records.read_header(data[self._whole[0].start : self._whole[0].stop])
+            with suppress(ValueError, struct.error):
+                profile, _ = records.read_header(data[self._whole[0].start : self._whole[0].stop])
         self._writer = McapFile(out, profile, f"{software()} recover")
         self._found = Recovery()
         self._left_out = 0
+        self._chunk_starts: list[int] = []
         self._newest_ns: int | None = None
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
@@ -96,13 +108,20 @@ class _Copy:
         for record in whole:  # an index at the end, if there is one, names channels of damaged chunks too
             if record.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
                 self._define(record.opcode, data[record.start : record.stop])
-        end = len(records.MAGIC)
-        for opcode, start, end in whole:
-            if opcode == Opcode.DATA_END:
+            elif record.opcode == Opcode.CHUNK_INDEX:
+                self._chunk_starts.append(records.read_chunk_start(data[record.start : record.stop]))
+        for piece in self._pieces:
+            if isinstance(piece, Lost):
+                if piece.stop == len(data):
+                    self._tail(data[piece.start :])
+                else:
+                    self._found.lost_bytes += piece.stop - piece.start
+                    for _ in range(self._chunks_in(piece)):
+                        self._leave_out()
+            elif piece.opcode == Opcode.DATA_END:
                 break
-            self._take(opcode, data[start:end])
-        else:
-            self._tail(data[end:])
+            else:
+                self._take(piece.opcode, data[piece.start : piece.stop])
         self._found.was_finished = data[-len(records.MAGIC) :] == records.MAGIC and len(whole) > 1
         self._close_gap(None)
         if self._found.gaps:
@@ -120,11 +139,12 @@ class _Copy:
             except (ValueError, struct.error):
                 self._leave_out()
         elif opcode == Opcode.METADATA:
-            name, entries = records.read_metadata(content)
-            if name == GAPS_NAME:
-                self._found.gaps += from_metadata(entries)
-            else:
-                self._writer.add_metadata(name, entries)
+            with suppress(ValueError, struct.error, RecordingError):
+                name, entries = records.read_metadata(content)
+                if name == GAPS_NAME:
+                    self._found.gaps += from_metadata(entries)
+                else:
+                    self._writer.add_metadata(name, entries)
         elif opcode == Opcode.MESSAGE:
             self._message(content)
 
@@ -138,6 +158,12 @@ class _Copy:
                     self._inside(chunk.unpack_what_is_there())
                 except (ValueError, struct.error):
                     self._leave_out()
+
+    def _chunks_in(self, lost: Lost) -> int:
+        """How many chunks began in what was lost; one where no index tells."""
+        if not self._chunk_starts:
+            return 1
+        return sum(lost.start <= start < lost.stop for start in self._chunk_starts)
 
     def _leave_out(self) -> None:
         """One more damaged chunk; those without a message between them are one gap."""
@@ -157,12 +183,13 @@ class _Copy:
                 self._define(opcode, data[start:stop])
 
     def _define(self, opcode: int, content: bytes) -> None:
-        if opcode == Opcode.SCHEMA:
-            schema = records.read_schema(content)
-            self._schemas[schema.number] = schema
-        else:
-            channel = records.read_channel(content)
-            self._channels[channel.number] = channel
+        with suppress(ValueError, struct.error):  # garbled: its messages are orphans
+            if opcode == Opcode.SCHEMA:
+                schema = records.read_schema(content)
+                self._schemas[schema.number] = schema
+            else:
+                channel = records.read_channel(content)
+                self._channels[channel.number] = channel
 
     def _message(self, content: bytes) -> None:
         number, sequence, log_ns, publish_ns = records.MESSAGE.unpack_from(content)

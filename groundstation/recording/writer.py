@@ -23,7 +23,7 @@ from groundstation.bus.record_stream import Recorded
 from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.declarations.message import Message
 from groundstation.recording.channel_names import channel_name
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NoRoomError, RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.policy import is_kept
@@ -32,6 +32,7 @@ from groundstation.recording.software import software
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+SUFFIX = ".mcap"
 PART_SUFFIX = ".part"
 FLUSH_PERIOD_NS = 250_000_000
 MOST_RECENT = 256
@@ -46,6 +47,7 @@ class Recorder:
         info: What the recording states about itself.
         flush_period_ns: At most this much of log time is lost when the recorder is killed.
         durable: Also force each flush through to the disk, against loss of power.
+        spare_bytes: Raise while so many bytes are left beside what finishing takes; 0: when none are.
 
     Raises:
         RecordingError: The file, or what a killed recorder left of it, is already there, or it
@@ -59,6 +61,7 @@ class Recorder:
         *,
         flush_period_ns: int = FLUSH_PERIOD_NS,
         durable: bool = False,
+        spare_bytes: int = 0,
     ) -> None:
         self.path = path
         self.part_path = path.with_name(path.name + PART_SUFFIX)
@@ -66,16 +69,16 @@ class Recorder:
         self._images = info.images
         self._flush_period_ns = flush_period_ns
         self._durable = durable
+        self._spare_bytes = spare_bytes
         self._flush_due_ns: int | None = None
         self._channels: dict[tuple[type[Message], str], int | None] = {}  # by class and owner
         self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
         self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
-        self._file: io.BufferedWriter | None = _open_new(path, self.part_path)
+        self._file: _File | None = _open_new(path, self.part_path)
         try:
             self._writer = McapFile(self._file, profile="ros2", library=software())
             self._writer.add_metadata(METADATA_NAME, info.to_metadata())
-            self._file.flush()
         except RecordingError:
             self.discard()  # nothing is in it that could be recovered
             raise
@@ -157,13 +160,23 @@ class Recorder:
         """Write the index and give the file its final name; may be called twice."""
         if self._file is not None:
             self._writer.finish()
-            self._file.flush()
             with on_disk(self.part_path):
                 os.fsync(self._file.fileno())
                 self._file.close()
                 self._file = None
                 self.part_path.replace(self.path)
         return self.path
+
+    def end_early(self) -> int:
+        """Finish without what a full disk has not taken; return how many messages that costs.
+
+        Raises:
+            RecordingError: Not even the index finds room; it may be tried again.
+        """
+        dropped = self._writer.drop_open_chunk()
+        self.message_count -= dropped
+        self.finish()
+        return dropped
 
     def discard(self) -> None:
         """Leave no file: for derived recordings whose making failed; does nothing after ``finish``."""
@@ -189,8 +202,19 @@ class Recorder:
         elif log_ns >= self._flush_due_ns:
             self._flush()
 
+    def check_room(self, free: int) -> None:
+        """End in time: the index that makes it a finished recording needs room, too.
+
+        Raises:
+            NoRoomError: The disk has less free bytes than that takes; what was written so far is whole.
+        """
+        if free < self.rest_bytes + self._spare_bytes:
+            raise NoRoomError(f"{self.part_path} cannot be written any further: the disk is full")
+
     def _flush(self) -> None:
         self._flush_due_ns = None
+        if self._spare_bytes:
+            self.check_room(free_bytes(self.part_path))
         self._writer.flush()
         if self._durable and self._file is not None:
             with on_disk(self.part_path):
@@ -216,12 +240,43 @@ class Recorder:
         return self._writer.add_channel(channel_name(noun, owner), "cdr", schema)
 
 
+def free_bytes(path: Path) -> int:
+    """On the disk of a file, for whoever is not root.
+
+    Raises:
+        RecordingError: Its folder is gone.
+    """
+    with on_disk(path):
+        found = os.statvfs(path.parent)
+    return found.f_bavail * found.f_frsize
+
+
 class _File(io.FileIO):
-    """A file whose writing fails in a sentence."""
+    """A file that says in a sentence why it takes no more.
+
+    The next piece then stands where the one began that did not find room: what was written of it stays until
+    then, for whoever recovers the file.
+    """
+
+    _is_torn = False
 
     def write(self, data: "ReadableBuffer", /) -> int:
+        left, start = memoryview(data), self.tell()
         with on_disk(Path(str(self.name))):
-            return super().write(data)
+            try:
+                while left:
+                    left = left[self._put(left) :]
+                if self._is_torn:
+                    self.truncate()
+                    self._is_torn = False
+            except OSError:
+                self.seek(start)
+                self._is_torn = True
+                raise
+        return len(memoryview(data))
+
+    def _put(self, data: memoryview) -> int:
+        return super().write(data)
 
 
 @contextmanager
@@ -237,15 +292,33 @@ def on_disk(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path} cannot be written any further: {error.strerror or error}") from error
 
 
-def _open_new(path: Path, part_path: Path) -> io.BufferedWriter:
-    if path.exists():
-        raise RecordingError(f"{path} is already there: recordings are never overwritten")
+def check_new_recording(path: Path) -> None:
+    """Refuse a path to which no recording can be written, before any work is done.
+
+    Raises:
+        RecordingError: It does not end in ``.mcap``, is taken, too long, or lies behind a file.
+    """
+    if path.suffix != SUFFIX:
+        raise RecordingError(f"{path} must end in {SUFFIX}: that is how viewers and reports know recordings")
+    try:
+        if path.exists():
+            raise RecordingError(f"{path} is already there: recordings are never overwritten")
+        path.with_name(path.name + PART_SUFFIX).exists()
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written: {error.strerror}") from error
+    behind = next((parent for parent in path.parents if parent.exists()), path)
+    if not behind.is_dir():
+        raise RecordingError(f"{path} cannot be written: {behind} is no folder")
+
+
+def _open_new(path: Path, part_path: Path) -> _File:
+    check_new_recording(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if part_path.exists():
             raise RecordingError(
                 f"{part_path} is left of a recording that was not finished: recover it or remove it first"
             )
-        return io.BufferedWriter(_File(part_path, "x"))
+        return _File(part_path, "x")
     except OSError as error:
         raise RecordingError(f"{part_path} cannot be written: {error.strerror}") from error

@@ -4,10 +4,12 @@ A rig file below the working directory is recorded by its relative path: such a 
 of the machine, and is replayed from any copy of the project.
 """
 
+import os
 from pathlib import Path
 
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import Rig
+from groundstation.files.reading import path_of, text_of_path
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
 from groundstation.recording.reader import Recording
@@ -47,9 +49,10 @@ def portable(rig_path: Path) -> str:
     """The path of a rig file as recordings carry it: relative to the working directory if it lies below."""
     found = rig_path.resolve()
     try:
-        return found.relative_to(Path.cwd()).as_posix()
+        found = found.relative_to(Path.cwd())
     except ValueError:
-        return str(found)
+        return text_of_path(found)
+    return text_of_path(found).replace(os.sep, "/")
 
 
 def recorded_rig(recording: Recording) -> Rig:
@@ -94,7 +97,7 @@ def changed_files(rig: Rig, info: RecordingInfo) -> list[str]:
 
 def _places(recording: Recording) -> list[Path]:
     """Where the rig file may stand: in folders that exist, or else where it stood."""
-    path = Path(recording.info.rig_path or recording.path)
+    path = path_of(recording.info.rig_path) if recording.info.rig_path else recording.path
     if path.is_absolute():
         return [path]
     places = [path, *(folder / path for folder in recording.path.resolve().parents)]

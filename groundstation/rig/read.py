@@ -5,7 +5,6 @@ launcher has read, so that what flies is what was hashed.
 """
 
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,8 @@ from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.tables import Tables
 from groundstation.files.errors import FileError
+from groundstation.files.reading import path_of, read_bytes, text_of
+from groundstation.files.toml_file import toml_of
 from groundstation.parts.table import installed_tables
 from groundstation.rig.compose import rig_model
 from groundstation.rig.plan import check_plan
@@ -47,11 +48,13 @@ def read_text(path: Path) -> str:
         RigError: There is no such file, or it is no text.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return text_of(path.read_bytes(), path)
     except FileNotFoundError as error:
         raise RigError(f"{path}: there is no such rig file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise RigError(f"{path}: cannot be read as a rig file ({error})") from error
+    except OSError as error:
+        raise RigError(f"{path}: cannot be read as a rig file ({error.strerror})") from error
+    except FileError as error:
+        raise RigError(str(error)) from error
 
 
 def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tables | None = None) -> Rig:
@@ -67,9 +70,9 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
         RigError: One sentence with file and key or line.
     """
     try:
-        content = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and a number of thousands of digits
-        raise RigError(f"{path}: is not valid TOML: {in_one_line(str(error))}") from error
+        content = toml_of(text, path)
+    except FileError as error:
+        raise RigError(in_one_line(str(error))) from error
     return build_rig(content, path, files, tables)
 
 
@@ -162,7 +165,7 @@ class _Reader:
         self._read: dict[Path, RigFile] = {}
 
     def __call__(self, name: str) -> RigFile:
-        path = self._folder / name
+        path = self._folder / path_of(name)
         found = self._read.get(path)
         if found is None:
             found = self._read[path] = RigFile(path, self._bytes(path))
@@ -176,10 +179,7 @@ class _Reader:
             return self._given[name]
         if name in self._known:
             return self._known[name]
-        try:
-            return path.read_bytes()
-        except OSError as error:
-            raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
+        return read_bytes(path)
 
 
 def bytes_of(rig: Rig) -> dict[str, bytes]:

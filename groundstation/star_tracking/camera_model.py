@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
-from groundstation.files.values import number, numbers, whole_number
+from groundstation.files.values import check_amount, number, numbers, whole_number
 from groundstation.frames import turned_axes
 
 _SCALARS = (
@@ -29,6 +29,9 @@ _SCALARS = (
     "mount_tilt_x_rad",
     "mount_tilt_y_rad",
 )
+_MOST_PX = 1e5  # of sides and focal lengths: larger pictures end in no memory
+_MOST_DISTORTION = 100.0
+_HIGHEST_M, _FARTHEST_M, _MOST_YAW_RAD = 100.0, 10.0, 7.0
 _MAX_TILT_RAD = 0.5  # beyond this the ceiling leaves the picture: the file means degrees
 
 
@@ -73,6 +76,16 @@ class CameraCalibration:
             raise ValueError(
                 f"ceiling_height_above_camera_m must be positive, not {self.ceiling_height_above_camera_m}"
             )
+        for name in ("width", "height", "fx", "fy", "cx", "cy"):
+            check_amount(name, getattr(self, name), _MOST_PX)
+        for value in self.distortion:
+            check_amount("dist_k1_k2_p1_p2_k3", value, _MOST_DISTORTION)
+        check_amount(
+            "ceiling_height_above_camera_m", self.ceiling_height_above_camera_m, _HIGHEST_M, "is it in mm?"
+        )
+        for value in self.mount_offset_body_m:
+            check_amount("mount_offset_body_m", value, _FARTHEST_M, "is it in mm?")
+        check_amount("mount_yaw_rad", self.mount_yaw_rad, _MOST_YAW_RAD, "is it in degrees?")
         for name in ("mount_tilt_x_rad", "mount_tilt_y_rad"):
             if abs(getattr(self, name)) > _MAX_TILT_RAD:
                 raise ValueError(f"{name} must lie within +-{_MAX_TILT_RAD} rad, not {getattr(self, name)}")

@@ -7,6 +7,7 @@ from pathlib import Path
 from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
 from groundstation.files.toml_file import parse_toml
+from groundstation.files.values import number
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,10 @@ def _number(path: Path, content: dict[str, object], table: str, key: str) -> flo
     if section.get("unit") != "s":
         raise FileError(f"{path}: the unit of [{table}] is {section.get('unit')!r}, expected 's'.")
     value = section[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
-        raise FileError(f"{path}: {key} of [{table}] is {value!r}, expected a number of zero or more.")
-    return float(value)
+    try:
+        found = number(section, key)
+    except ValueError:
+        found = -1.0
+    if found < 0.0:
+        raise FileError(f"{path}: {key} of [{table}] is {value!r:.80}, expected a number of zero or more.")
+    return found

@@ -48,16 +48,23 @@ class Check:
 
 def _heartbeats(question: Question) -> str:
     sightings, now_ns = question.sightings, question.now_ns
+    is_imu_dead = any(row.fault.id == "imu_silent" for row in question.standing)
+    no_state = "fusion" + (", which gets no IMU samples" if is_imu_dead else "")
     missing = [
         name
         for name, is_missing in (
             ("valve node", sightings.node is None or sightings.is_node_silent(now_ns)),
             ("fault detector", sightings.findings_ns is None),
-            ("fusion", sightings.own is None or sightings.is_state_silent(now_ns)),
+            (no_state, _has_no_state(question) or (sightings.own and sightings.is_state_silent(now_ns))),
         )
         if is_missing
     ]
     return f"nothing comes from {', '.join(missing)}" if missing else ""
+
+
+def _has_no_state(question: Question) -> bool:
+    """Whether nothing came of fusion; one that counts its rest but has no fix yet is alive."""
+    return question.sightings.own is None and question.sightings.rest_s <= 0.0
 
 
 def _rest(question: Question) -> str:
@@ -69,6 +76,8 @@ def _rest(question: Question) -> str:
 
 def _fixes(question: Question) -> str:
     own, age_s = question.sightings.own, question.sightings.fix_age_s
+    if _has_no_state(question):
+        return "they cannot be judged, since nothing comes from fusion"
     if own is None or own.status != "flying":
         return "no agreeing fixes have placed it yet"
     if age_s > OLDEST_FIX_S:

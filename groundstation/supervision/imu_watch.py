@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 
 SILENT_S = 0.3
+FIRST_SAMPLE_S = 3.0
+"""After so long without any sample a block is dead and does not only start."""
 BAD_S = 0.1
 """So long in a row samples must be refused before it is a fault: one bad frame is noise."""
 JUMP_MS = 200
@@ -16,6 +18,7 @@ class ImuWatch:
 
     def __init__(self) -> None:
         self._arrival_ns: int | None = None
+        self._watched_since_ns: int | None = None
         self._bad_since_ns: int | None = None
         self._reason = ""
         self._is_rate_usable = True
@@ -56,8 +59,12 @@ class ImuWatch:
         self._reason, self._is_rate_usable = reason, is_rate_usable
 
     def findings(self, now_ns: int) -> Iterator[tuple[str, str]]:
-        """Faults at this moment, by id with details; nothing before the first sample."""
+        """Faults at this moment, by id with details; before the first sample only that none comes."""
         if self._arrival_ns is None:
+            if self._watched_since_ns is None:
+                self._watched_since_ns = now_ns
+            if now_ns - self._watched_since_ns > FIRST_SAMPLE_S * 1e9:
+                yield "imu_silent", "no sample has come yet"
             return
         silent_s = (now_ns - self._arrival_ns) * 1e-9
         if silent_s > SILENT_S:

@@ -194,7 +194,8 @@ class Sightings:
         if self.recorder_ns is not None and self.is_silent(self.recorder_ns, RECORDER_S, now_ns):
             yield "recorder_down", _age("status", self.recorder_ns, now_ns)
         elif self.recorder_room_s < LEAST_ROOM_S:
-            yield "disk_low", f"room for {self.recorder_room_s:.0f} s"
+            room_s = self.recorder_room_s
+            yield "disk_low", f"room for {room_s:.0f} s" if room_s else "it is full: nothing is recorded"
         for name in self.leaders:
             seen = self.others.get(name)
             if seen is not None and self.is_silent(seen.arrival_ns, OTHER_S, now_ns):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.declarations.errors import UsageError
+from groundstation.files.writing import check_folder, whole_folder, write_file
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
@@ -20,7 +21,9 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
 
     Raises:
         UsageError: The recording holds no vehicle's state.
+        FileError: The folder cannot be written.
     """
+    check_folder(folder)
     progress("reading the recording", 0.0)
     tables = installed_tables()
     with Recording(recording) as source:
@@ -28,7 +31,7 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         duration_s = (source.stop_ns - source.start_ns) * 1e-9
     if not reports:
         raise UsageError(f"{recording}: holds no vehicle state, so there is nothing to report")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
     tracks = {name: report.track for name, report in reports.items()}
     figures = {
         "table.png": draw_table,
@@ -37,20 +40,18 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         "fixes.png": draw_fixes,
         "latency.png": draw_latency,
     }
-    written = []
-    for done, (name, draw) in enumerate(figures.items(), start=1):
-        progress(f"drawing {name}", done / (len(figures) + 1))
-        draw(tracks, folder / name)
-        written.append(folder / name)
     summary = {
         "recording": recording.name,
         "duration_s": duration_s,
         "vehicles": {name: report.numbers for name, report in reports.items()},
     }
-    path = folder / "report.json"
-    path.write_text(json.dumps(_plain(summary), indent=1) + "\n")
+    with whole_folder(folder) as made:
+        for done, (name, draw) in enumerate(figures.items(), start=1):
+            progress(f"drawing {name}", done / (len(figures) + 1))
+            draw(tracks, made / name)
+        write_file(made / "report.json", json.dumps(_plain(summary), indent=1) + "\n")
     progress("done", 1.0)
-    return [path, *written]
+    return [folder / name for name in ("report.json", *figures)]
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 any JSON value

@@ -6,8 +6,10 @@ from pathlib import Path
 from calibration.sky.survey.surveyed_sky import Anchor
 from groundstation.files.errors import FileError
 from groundstation.files.number_tables import load_table
+from groundstation.star_tracking.star_catalogue import FARTHEST_M
 
 LEAST = 2
+_MOST_PX = 1e5
 
 
 def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:
@@ -16,7 +18,8 @@ def read_anchors(path: Path, frames: Sequence[str]) -> list[Anchor]:
     Raises:
         FileError: The file is missing, a column is, or a value is no number or no frame.
     """
-    table = load_table(path, ("x_m", "y_m", "u", "v"), ("id", "frame"), unique=("id",))
+    most = {"x_m": FARTHEST_M, "y_m": FARTHEST_M, "u": _MOST_PX, "v": _MOST_PX}
+    table = load_table(path, tuple(most), ("id", "frame"), unique=("id",), most=most)
     number = {stem: i for i, stem in enumerate(frames)}
     anchors = []
     for line, name, frame, (x_m, y_m, u_px, v_px) in zip(

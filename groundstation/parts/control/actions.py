@@ -2,13 +2,21 @@
 
 from groundstation.declarations.request import Action, Argument
 
+FARTHEST_M, MOST_TURNED_RAD = 100.0, 1000.0
+"""Beyond what anybody means: the table is smaller, and a controller turns the shorter way."""
+
 GO_TO = Action(
     "go_to",
     "controller",
     "hold another pose",
     (
-        Argument("x_m", "table x of the centre of mass"),
-        Argument("y_m", "table y of the centre of mass"),
-        Argument("heading_rad", "from table +x to body +x, counter-clockwise"),
+        Argument("x_m", "table x of the centre of mass", low=-FARTHEST_M, high=FARTHEST_M),
+        Argument("y_m", "table y of the centre of mass", low=-FARTHEST_M, high=FARTHEST_M),
+        Argument(
+            "heading_rad",
+            "from table +x to body +x, counter-clockwise",
+            low=-MOST_TURNED_RAD,
+            high=MOST_TURNED_RAD,
+        ),
     ),
 )

@@ -104,8 +104,8 @@ def _check(rig: Rig) -> None:
         assert isinstance(type_, StarsOfType)
         camera = type_.star_camera
         if camera is not None:
-            camera.camera.value(CameraCalibration.parse)
-            camera.ceiling.value(StarCatalogue.parse)
+            lens = camera.camera.value(CameraCalibration.parse)
+            camera.ceiling.value(StarCatalogue.parse).check_in_view(lens, str(camera.ceiling.path))
             assert not any(map(math.isnan, camera.delay))
     for name, vehicle in rig.vehicles.items():
         own = rig.vehicle(name, StarsOfVehicle)

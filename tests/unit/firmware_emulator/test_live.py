@@ -175,7 +175,7 @@ def test_the_process_announces_its_ports_and_leaves_none_behind(tmp_path, ending
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("[laboratory", "is no TOML file"),
+        ("[laboratory", "is not valid TOML"),
         ("[station]\nx = 1\n", "has no table [laboratory]"),
         ('[[laboratory.vehicles]]\nname = "alpha"\nmas_kg = 1\n', "laboratory.vehicles.0.mas_kg"),
         ('[[laboratory.vehicles]]\nname = "alpha"\n[[laboratory.failures]]\nkind = "x"\nvehicle = "alpha"\n',

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_emulator.sky.scene import SceneError, build_sky, read_camera, read_ceiling
+from drivers.files.errors import FileError
+from firmware_emulator.sky.scene import build_sky, read_camera, read_ceiling
 from firmware_emulator.sky.sky import Sky
 
 ROOT = Path(__file__).parents[4]
@@ -60,18 +61,18 @@ def test_the_camera_of_the_rig_is_read_key_by_key():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "no column id, x_m, y_m"),
-        ("id,x_m\n0,1\n", "no column y_m"),
-        ("id,x_m,y_m\n", "holds no LED"),
-        ("id,x_m,y_m\n0,1,2\n1,left,2\n", "line 3: x_m and y_m must be numbers"),
-        ("id,x_m,y_m\n0,1\n", "line 2: x_m and y_m must be numbers"),
-        ("id,x_m,y_m\n0,nan,2\n", "line 2: x_m and y_m must be finite"),
+        ("", "is empty, expected the header id,x_m,y_m"),
+        ("id,x_m\n0,1\n", "line 1, column 'y_m' is missing"),
+        ("id,x_m,y_m\n", "has a header but no rows"),
+        ("id,x_m,y_m\n0,1,2\n1,left,2\n", "line 3, x_m is 'left', expected a number"),
+        ("id,x_m,y_m\n0,1\n", "line 2 has 2 columns, expected 3"),
+        ("id,x_m,y_m\n0,nan,2\n", "line 2, x_m is 'nan', expected a number"),
     ],
 )
 def test_a_bad_star_list_is_named_with_its_place(tmp_path, text, says):
     path = tmp_path / "ceiling.csv"
     path.write_text(text)
-    with pytest.raises(SceneError, match=says) as caught:
+    with pytest.raises(FileError, match=says) as caught:
         read_ceiling(path)
     assert str(path) in str(caught.value)
 
@@ -92,7 +93,7 @@ def test_a_bad_camera_file_names_the_key(tmp_path, key, value):
     data[key] = value
     path = tmp_path / "camera.json"
     path.write_text(json.dumps(data))
-    with pytest.raises(SceneError, match=f"key '{key}' must be"):
+    with pytest.raises(FileError, match=f"key '{key}' must be"):
         read_camera(path)
 
 
@@ -100,13 +101,13 @@ def test_a_bad_camera_file_names_the_key(tmp_path, key, value):
 def test_a_file_that_is_no_camera_is_refused(tmp_path, text):
     path = tmp_path / "camera.json"
     path.write_text(text)
-    with pytest.raises(SceneError, match=str(path)):
+    with pytest.raises(FileError, match=str(path)):
         read_camera(path)
 
 
 def test_missing_files_are_said(tmp_path):
     for read in (read_ceiling, read_camera):
-        with pytest.raises(SceneError, match="cannot read"):
+        with pytest.raises(FileError, match="cannot be read"):
             read(tmp_path / "absent")
 
 
@@ -115,7 +116,7 @@ def test_a_camera_with_a_height_of_nothing_is_refused(tmp_path):
     data["ceiling_height_above_camera_m"] = 0
     path = tmp_path / "camera.json"
     path.write_text(json.dumps(data))
-    with pytest.raises(SceneError, match="positive"):
+    with pytest.raises(FileError, match="positive"):
         read_camera(path)
 
 

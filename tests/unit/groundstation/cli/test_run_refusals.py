@@ -9,6 +9,7 @@ import pytest
 from groundstation.cli.main import call
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
+RECORDED = Path(__file__).parents[3] / "replay" / "recordings" / "formation.mcap"
 DRAWN = (RIGS / "drawn_fixes.toml").read_text()
 RENDERED = (
     (RIGS / "two_mock_ups.toml")
@@ -107,7 +108,13 @@ def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys):
         (["nowhere.toml"], "nowhere.toml: there is no such rig file"),
         ([RIGS / "drawn_fixes.toml", "--lockstep"], "--lockstep needs --duration"),
         ([RIGS / "drawn_fixes.toml", "--seed", "3"], "--seed goes with --lockstep"),
-        ([RIGS / "drawn_fixes.toml", "--record", RIGS / "drawn_fixes.toml"], "never overwritten"),
+        ([RIGS / "drawn_fixes.toml", "--record", RECORDED], "never overwritten"),
+        ([RIGS / "drawn_fixes.toml", "--record", "noend"], "noend must end in .mcap"),
+        ([RIGS / "drawn_fixes.toml", "--record", "run.MCAP"], "run.MCAP must end in .mcap"),
+        ([RIGS / "drawn_fixes.toml", "--record", RECORDED / "x.mcap"], "formation.mcap is no folder"),
+        ([RIGS / "drawn_fixes.toml", "--record", f"{'x' * 250}.mcap"], "File name too long"),
+        ([RIGS / "drawn_fixes.toml", "--report", RECORDED / "x"], "no such folder can be made"),
+        ([RIGS / "drawn_fixes.toml", "--report", "x" * 300], "File name too long"),
         ([RIGS], "cannot be read as a rig file"),
     ],
 )  # fmt: skip

@@ -47,5 +47,5 @@ def test_a_mark_of_the_byte_order_is_no_part_of_the_text(tmp_path):
 
 
 def test_what_is_no_text_is_refused_by_the_files_name(tmp_path):
-    with pytest.raises(ValueError, match="x: is not UTF-8 text"):
+    with pytest.raises(ValueError, match="x: is not a text file"):
         RigFile(tmp_path / "x", b"\xff\xfe\x00").text()

@@ -1,10 +1,12 @@
+import os
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from groundstation.files.errors import FileError
 from groundstation.files.png import png_of, write_png
-from groundstation.files.writing import check_targets, whole_folder, write_files
+from groundstation.files.writing import check_folder, check_targets, whole_folder, write_files
 
 
 def test_several_files_are_written_together(tmp_path):
@@ -38,6 +40,28 @@ def test_targets_are_refused_before_any_work(tmp_path):
         check_targets(tmp_path / "nowhere" / "a")
     with pytest.raises(FileError, match="it is a folder"):
         check_targets(tmp_path)
+    for bad in (tmp_path / ("x" * 300), tmp_path / "file" / "x"):
+        (tmp_path / "file").touch()
+        with pytest.raises(FileError, match="cannot be written"):
+            check_targets(bad)
+        with pytest.raises(FileError, match="no such folder can be made"):
+            check_folder(bad)
+
+
+def test_a_pipe_or_a_device_is_never_replaced_by_a_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="it is no file"):
+        check_targets(tmp_path / "pipe")
+    with pytest.raises(FileError, match="it is no file"):
+        write_files({tmp_path / "pipe": "x"})
+    assert (tmp_path / "pipe").is_fifo()
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+@pytest.mark.parametrize("length", [1, 200, 255])
+def test_a_name_as_long_as_the_disk_takes_is_written_and_one_that_no_locale_could_decode(tmp_path, length):
+    write_files({tmp_path / ("x" * length): "S\udcc3\udcbcd ± 1\n"})
+    assert (tmp_path / ("x" * length)).read_text(encoding="utf-8") == "Süd ± 1\n"
 
 
 def test_a_folder_comes_whole_or_not_at_all(tmp_path):

@@ -8,7 +8,8 @@ import pytest
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import RecordWriter, read_batch
-from groundstation.launch.recorder import SPARE_BYTES, live_on, write_until_end
+from groundstation.launch.recorder import write_until_end
+from groundstation.launch.recorder_pause import SPARE_BYTES
 from groundstation.launch.recorder_reporter import RATE_WINDOW_NS, RecorderReporter
 from groundstation.parts.operation.messages import Latency, RecorderStatus
 from groundstation.recording.errors import RecordingError
@@ -81,7 +82,7 @@ def test_the_room_is_what_is_free_at_the_rate_of_the_last_seconds(tmp_path):
 
 def test_on_a_disk_that_fills_it_ends_in_time_and_the_file_is_whole(tmp_path):
     disk = SPARE_BYTES + 60_000
-    recorder = Recorder(tmp_path / "run.mcap", INFO)
+    recorder = Recorder(tmp_path / "run.mcap", INFO, spare_bytes=SPARE_BYTES)
     reporter = RecorderReporter(recorder, Bus(), "recorder", free=lambda _path: disk - recorder.written_bytes)
 
     def fill():
@@ -109,13 +110,3 @@ def test_what_is_left_to_write_is_never_underestimated(tmp_path, messages):
     before, rest = recorder.written_bytes, recorder.rest_bytes
     size = recorder.finish().stat().st_size
     assert before <= size <= before + rest
-
-
-def test_a_recorder_without_a_file_lives_on_until_it_is_asked_to_end():
-    bus, waiting = Bus(), queue.SimpleQueue()
-    for item in (b"batch", b"nonsense", None):
-        waiting.put(item)
-    live_on(waiting, bus, "recorder")
-    ((process, batch),) = bus.batches
-    assert (process, list(read_batch(batch))) == ("recorder", [])
-    assert waiting.empty()

@@ -88,7 +88,7 @@ def test_a_rig_without_the_node_is_refused(tmp_path, flight):
 def test_a_refused_replay_leaves_no_file(tmp_path, flight):
     with pytest.raises(UsageError, match="'alpha/fuson'"):
         call(flight, "--node", "alpha/fuson", "--out", tmp_path / "out.mcap")
-    with pytest.raises(UsageError, match="cannot be read"):
+    with pytest.raises(UsageError, match="there is no such rig file"):
         call(flight, "--rig", tmp_path / "nothing.toml", "--out", tmp_path / "out.mcap")
     with pytest.raises(UsageError, match="No such file"):
         call(tmp_path / "nothing.mcap")

@@ -31,8 +31,23 @@ def test_a_vehicle_of_which_nothing_is_known_stays_down(sightings):
     assert against(sightings()) == (
         "heartbeats: nothing comes from valve node, fault detector, fusion",
         "rest: unbroken rest of 0.0 s, 8 s are asked for",
-        "fixes: no agreeing fixes have placed it yet",
+        "fixes: they cannot be judged, since nothing comes from fusion",
     )
+
+
+def test_a_dead_imu_is_the_reason_and_not_the_stars(known):
+    known.own, known.rest_s = None, 0.0
+    assert against(known, "imu_silent") == (
+        "heartbeats: nothing comes from fusion, which gets no IMU samples",
+        "faults: imu_silent (why)",
+        "rest: unbroken rest of 0.0 s, 8 s are asked for",
+        "fixes: they cannot be judged, since nothing comes from fusion",
+    )
+
+
+def test_a_dead_sky_is_the_reason_where_the_imu_lives(known):
+    known.own = None
+    assert against(known) == ("fixes: no agreeing fixes have placed it yet",)
 
 
 @pytest.mark.parametrize(
@@ -40,6 +55,7 @@ def test_a_vehicle_of_which_nothing_is_known_stays_down(sightings):
 )
 def test_each_heartbeat_is_asked_for(known, silent, name):
     setattr(known, silent, None)
+    known.rest_s = 0.0
     assert f"heartbeats: nothing comes from {name}" in against(known, override="test")
 
 

@@ -1,0 +1,1 @@
+"""Files that people hand over, read in one way: bytes, text, tables, JSON, TOML; refused in one sentence."""

@@ -1,0 +1,74 @@
+"""Bytes and text of a file, refused in one sentence."""
+
+import codecs
+import os
+from pathlib import Path
+
+from drivers.files.errors import FileError
+
+_MARKS = (  # UTF-32 first: its mark begins with that of UTF-16
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_WORKBOOKS = {b"PK\x03\x04": "a workbook (.xlsx, .ods)", b"\xd0\xcf\x11\xe0": "a workbook (.xls)"}
+_LOOKED_AT = 4096  # of bytes, to tell UTF-16 without a mark
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a whole file.
+
+    Raises:
+        FileError: It is missing or cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
+    except ValueError as error:  # a NUL in the name
+        raise FileError(f"{str(path)!r}: cannot be read ({error}).") from error
+
+
+def path_of(text: str) -> Path:
+    """The path that a file states, whatever the locale: names are UTF-8 in files and on disks."""
+    return Path(os.fsdecode(text.encode(errors="surrogateescape")))
+
+
+def text_of_path(path: Path) -> str:
+    """A path as files state it."""
+    return os.fsencode(path).decode(errors="replace")
+
+
+def text_of(data: bytes, path: Path) -> str:
+    """Decode UTF-8, or what a byte order mark or the zeros of ASCII in UTF-16 show it to be.
+
+    Lines end with a newline alone.
+
+    Raises:
+        FileError: It is no text.
+    """
+    mark, encoding = next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), (b"", ""))
+    if not encoding:
+        encoding = _unmarked(data[:_LOOKED_AT])
+    for head, what in _WORKBOOKS.items():
+        if data.startswith(head):
+            raise FileError(f"{path}: is {what} and no text; save it as CSV.")
+    try:
+        text = data[len(mark) :].decode(encoding)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        name = encoding[: encoding.index("-", 4)] if encoding.count("-") > 1 else encoding
+        raise FileError(f"{path}: is not a text file (line {line} is no {name.upper()}).") from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _unmarked(head: bytes) -> str:
+    """UTF-8, unless every other byte is the zero that ASCII has in UTF-16."""
+    half = len(head) // 2
+    if half and head[1::2].count(0) > 0.8 * half and head[0::2].count(0) < 0.2 * half:
+        return "utf-16-le"
+    if half and head[0::2].count(0) > 0.8 * half and head[1::2].count(0) < 0.2 * half:
+        return "utf-16-be"
+    return "utf-8"
