@@ -117,14 +117,17 @@ def fly(*links, said_s=None):
     clock = TickClock(link.baud) if said_s is None else TickClock(link.baud, latency_timer_s=said_s)
     if said_s is None:
         clock.measured_timer(link.timer_s)
-    stamps, locked_from = [], None
+    stamps, locked_from, truths = [], None, []
     for each in links:
+        before = len(stamps)
         for arrival_ns, chunk in each.run().reads:
             frames = [frame for frame in parser.feed(chunk) if isinstance(frame, ImuFrame)]
             stamps += clock.update(arrival_ns, len(chunk), frames)
             if locked_from is None and clock.is_locked:
                 locked_from = len(stamps)
-    truth = np.concatenate([each.truth_ns for each in links])[: len(stamps)]
+        # a block that begins anew may lose its first frames: the parser waits until they follow each other
+        truths.append(each.truth_ns[len(each.truth_ns) - (len(stamps) - before) :])
+    truth = np.concatenate(truths)
     got = np.array([stamp.stamp_ns for stamp in stamps], dtype=float)
     sigma = np.array([stamp.stamp_sigma_s for stamp in stamps])
     return Flight(stamps, clock, (got - truth) * 1e-9, sigma, locked_from or len(stamps))
