@@ -39,6 +39,7 @@ _CHUNK_INDEX_BYTES = 128
 """Of a chunk in the summary, beside ten for each of its channels."""
 _FIXED_SUMMARY_BYTES = 4096
 """Statistics without channels, offsets and footer, generously."""
+_NEVER_NS = 2**64 - 1
 _FOOTER_CRC = struct.Struct("<BQQQ")
 
 
@@ -64,7 +65,8 @@ class McapFile:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata: list[MetadataIndex] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks: list[bytes] = []  # their indexes, packed: an hour has fifteen thousand
+        self._first_ns, self._last_ns = _NEVER_NS, 0
         self._counts: dict[int, int] = {}
         self._summary_bytes = _FIXED_SUMMARY_BYTES
         file.write(MAGIC + _packed(Header(profile, library)))
@@ -131,7 +133,7 @@ class McapFile:
         start = self._file.tell() + len(end)
         summary, offsets = b"", b""
         for opcode, records in self._summary():
-            group = b"".join(map(_packed, records))
+            group = b"".join(records)
             offsets += _packed(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
         offset_start = start + len(summary)
@@ -140,13 +142,13 @@ class McapFile:
         # one piece, like a chunk with its indexes: a disk that is full takes all of it or nothing
         self._file.write(end + summary + offsets + _packed(Footer(start, offset_start, crc)) + MAGIC)
 
-    def _summary(self) -> Iterable[tuple[Opcode, Iterable[_Record]]]:
-        yield Opcode.SCHEMA, self._schemas
-        yield Opcode.CHANNEL, self._channels
-        yield Opcode.STATISTICS, [self._statistics()]
+    def _summary(self) -> Iterable[tuple[Opcode, Iterable[bytes]]]:
+        yield Opcode.SCHEMA, map(_packed, self._schemas)
+        yield Opcode.CHANNEL, map(_packed, self._channels)
+        yield Opcode.STATISTICS, [_packed(self._statistics())]
         yield Opcode.CHUNK_INDEX, self._chunks
         yield Opcode.ATTACHMENT_INDEX, ()
-        yield Opcode.METADATA_INDEX, self._metadata
+        yield Opcode.METADATA_INDEX, map(_packed, self._metadata)
 
     def _statistics(self) -> Statistics:
         return Statistics(
@@ -155,8 +157,8 @@ class McapFile:
             channel_message_counts=self._counts,
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
-            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
-            message_start_time=min((chunk.message_start_time for chunk in self._chunks), default=0),
+            message_end_time=self._last_ns,
+            message_start_time=self._first_ns if self._chunks else 0,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
@@ -192,19 +194,19 @@ class McapFile:
         self._file.write(b"".join((head, packed, indexes)))
         for channel, index in self._stamps_and_offsets.items():
             self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
-        self._chunks.append(
-            ChunkIndex(
-                chunk_length=length,
-                chunk_start_offset=start,
-                compression=_COMPRESSION,
-                compressed_size=len(packed),
-                message_end_time=high_ns,
-                message_index_length=len(indexes),
-                message_index_offsets=offsets,
-                message_start_time=low_ns,
-                uncompressed_size=len(records),
-            )
+        listed = ChunkIndex(
+            chunk_length=length,
+            chunk_start_offset=start,
+            compression=_COMPRESSION,
+            compressed_size=len(packed),
+            message_end_time=high_ns,
+            message_index_length=len(indexes),
+            message_index_offsets=offsets,
+            message_start_time=low_ns,
+            uncompressed_size=len(records),
         )
+        self._chunks.append(_packed(listed))
+        self._first_ns, self._last_ns = min(self._first_ns, low_ns), max(self._last_ns, high_ns)
         self._summary_bytes += _CHUNK_INDEX_BYTES + 10 * len(offsets)
         self._parts.clear()
         self._stamps_and_offsets.clear()

@@ -12,7 +12,7 @@ from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
 
 FLOAT_RETRY_NS = 100_000_000
-COUNTED_NS = 500_000_000
+COUNTED_NS = 250_000_000
 """Over so long frames are counted."""
 BUTTON_PAUSE_NS = 300_000_000
 """Stop frames that follow each other faster are one press."""
