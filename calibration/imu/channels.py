@@ -17,6 +17,8 @@ UNITS: Mapping[str, str] = {"omega": "rad/s", "ax": "m/s^2", "ay": "m/s^2"}
 MOST_EQUAL = 0.9
 """A larger share of packets with one and the same reading is a stuck channel, or steps beyond its noise."""
 MOST_AT_THE_END = 0.02
+STUCK_PACKETS = 100
+"""In a row with one and the same reading: noise changes it sooner, be its steps as coarse as they may."""
 HEAPED = 1.5
 """At a limit packets heap up: more than at the reading beside it, by this factor; noise thins out."""
 
@@ -61,6 +63,9 @@ def complaint_about(values: Array) -> str | None:
         stuck = float(level[count.argmax()])
         why = "not connected?" if stuck == 0.0 else "stuck, saturated, or its steps are larger than its noise"
         return f"reads {stuck:.6g} in {_percent(share)} of the packets: {why}"
+    longest = int(np.diff(np.flatnonzero(np.diff(known, prepend=np.nan, append=np.nan) != 0.0)).max())
+    if longest >= STUCK_PACKETS:
+        return f"was stuck: it has the same reading in {longest} packets in a row"
     for end, beside in ((-1, -2), (0, 1)):
         if count[end] > MOST_AT_THE_END * len(known) and count[end] > HEAPED * count[beside]:
             return (

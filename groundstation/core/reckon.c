@@ -11,26 +11,30 @@ static int is_beyond_scale(const Reckoner *r, Readings at) {
     return !(within(r->full_rate, at.rate) && within(r->full_force, at.ax) && within(r->full_force, at.ay));
 }
 
-static int is_near(const Reckoner *r, Readings at, Readings other) {
-    return within(r->max_rate_step, at.rate - other.rate) && within(r->max_force_step, at.ax - other.ax) &&
+/* A vehicle that nobody listened to has had time to turn faster; its forces are what the valves can do, as ever. */
+enum { TURNS_FASTER_AFTER = 10 }; /* packets */
+
+static int is_near(const Reckoner *r, Readings at, Readings other, double packets) {
+    const double rate_step = r->max_rate_step * fmax(1.0, packets / TURNS_FASTER_AFTER);
+    return within(rate_step, at.rate - other.rate) && within(r->max_force_step, at.ax - other.ax) &&
            within(r->max_force_step, at.ay - other.ay);
 }
 
 /* tests/oracles/packet_screen.py: one packet that jumps away and back is not motion. */
-static int is_wild(Reckoner *r, Readings at) {
+static int is_wild(Reckoner *r, Readings at, double packets) {
     if (!r->has_last) {
         if (is_beyond_scale(r, at)) return 1;
         r->last = at;
         r->has_last = 1;
         return 0;
     }
-    if (is_near(r, at, r->last)) {
+    if (is_near(r, at, r->last, packets)) {
         r->last = at;
         r->has_suspect = 0;
         return 0;
     }
     if (is_beyond_scale(r, at)) return 1;
-    if (r->has_suspect && is_near(r, at, r->suspect)) {
+    if (r->has_suspect && is_near(r, at, r->suspect, 1.0)) {
         r->last = at;
         r->has_suspect = 0;
         return 0;
@@ -131,7 +135,7 @@ int gs_reckoner_add(Reckoner *r) {
     }
     Readings read = {asked.rate_rad_s, asked.ax_m_s2, asked.ay_m_s2};
     double hole = 0.0;
-    if (is_wild(r, read)) {
+    if (is_wild(r, read, dt / period)) {
         flags |= WILD;
         read = r->good;
         hole = 1.0;

@@ -29,6 +29,10 @@ PAUSE_S = 10.0
 LOST_SPEED_M_S = MAX_SPEED_M_S
 LOST_RATE_RAD_S = 0.2
 """What a vehicle may do while the filter is lost: its sigmas grow by that since the last used fix."""
+HOLE_PERIODS = 10.0
+"""A hole of more windows is carried through the covariance at once; of fewer, at the next fix."""
+NEIGHBOURS = 25
+"""Packets after a hole that tell, with those before it, what went on in it (``carry.c``)."""
 LOOK_NS = 1_000_000_000
 """While no fix comes, how long the local slope is taken to be what it was."""
 
@@ -57,6 +61,7 @@ class ErrorStateFilter:
         self._reported = self._judge.checkpoint
         """From which the report is reckoned."""
         self._look_due_ns = 0
+        self._hole_end_s = -math.inf
         self._fixed_s = 0.0
         """Exposure of the last used fix."""
         self._is_reported_lost = False
@@ -169,12 +174,21 @@ class ErrorStateFilter:
         self._judge.finish()
 
     def _cross(self, hole_s: float) -> None:
-        """Be lost after a long time without packets, unless the vehicle rests."""
+        """Report what a hole leaves open; be lost after a long one; at rest it leaves nothing open."""
         reckoner = self._reckoner
         reckoner.crossed_s = 0.0
-        if hole_s <= LONGEST_HOLE_S or not reckoner.has_pose:
+        period_s = self.noise.packet_period_s
+        if hole_s <= HOLE_PERIODS * period_s or not reckoner.has_pose:
             return
         if self._course.rests.at(reckoner.newest_s) is not None:
+            return
+        if hole_s <= LONGEST_HOLE_S:  # of a longer one no covariance says what may have gone on
+            end_s = self._hole_end_s = reckoner.newest_s - period_s
+            jump_rad_s = reckoner.history.jump_rad_s()
+            self._course.doubt.missed(end_s - hole_s, end_s, jump_rad_s * hole_s / math.sqrt(12.0))
+            self._integrate_to_now()
+            # again as soon as the packets after it tell how busy the valves were
+            self._look_due_ns = reckoner.newest_ns + round(NEIGHBOURS * period_s * 1e9)
             return
         reckoner.is_lost = True
         self._judge.unseen_until_s = reckoner.newest_s
@@ -204,6 +218,8 @@ class ErrorStateFilter:
             return
         reckoner, at = self._reckoner, self._judge.checkpoint
         self._reported = at
+        if at.t_s < self._hole_end_s and not reckoner.is_lost:
+            at = self._course.carry(at, reckoner.newest_s)  # no polynomial in time knows of the hole
         x = self._course.state_at(at, reckoner.newest_s, 1e-9 * LOOK_NS)
         self._look_due_ns = reckoner.newest_ns + LOOK_NS
         reckoner.load(x[: es.SIZE], x[: es.MOVING])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.fusion.error_state import MOVING, PX, PY, VX, VY
+from groundstation.fusion.error_state import MOVING, PX, PY, THETA, VX, VY
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,8 @@ class _Stretch(NamedTuple):
     stop_s: float
     x: bool
     y: bool
+    turn_rad2: float = 0.0
+    """Variance of the turn over all of it."""
 
 
 class ForceDoubt:
@@ -44,6 +46,11 @@ class ForceDoubt:
         if x or y:
             self._stretches.append(_Stretch(t_s, math.inf, x, y))
 
+    def missed(self, start_s: float, stop_s: float, turn_sigma_rad: float) -> None:
+        """Note a past stretch in which nothing was measured, and how well it is known how far it turned."""
+        stretch = _Stretch(start_s, stop_s, x=True, y=True, turn_rad2=turn_sigma_rad**2)
+        self._stretches.insert(len(self._stretches) - self.is_open, stretch)
+
     def forget_before(self, t_s: float) -> None:
         """Drop what ended before."""
         self._stretches = [each for each in self._stretches if each.stop_s > t_s]
@@ -69,6 +76,8 @@ class ForceDoubt:
             early, late = stop_s - max(each.start_s, start_s), stop_s - min(each.stop_s, stop_s)
             if early <= late:
                 continue
+            if each.turn_rad2:
+                Q[THETA, THETA] += each.turn_rad2 * (early - late) / (each.stop_s - each.start_s)
             over = [(early**k - late**k) / k for k in (1, 2, 3)]  # of 1, (time left), (time left)^2
             qx, qy = self._power * each.x, self._power * each.y
             table = np.array(

@@ -71,6 +71,11 @@ class PacketHistory:
         row = min(int(np.searchsorted(ends, t_s)), n - 1)
         return self.rows[row * COLUMNS + 2]
 
+    def jump_rad_s(self) -> float:
+        """Return by how much the gyro read more after the newest hole than before it."""
+        rates = self.rows[-3 * COLUMNS + 2 :: COLUMNS]
+        return rates[-1] - rates[0] if len(rates) == 3 else 0.0
+
     def between(self, start_s: float, stop_s: float) -> Segment:
         """Return a copy of the packets that cover `start_s` to `stop_s`, the outer two cut.
 

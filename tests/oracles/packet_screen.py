@@ -5,6 +5,9 @@ from __future__ import annotations
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.reckoner import largest_steps
 
+TURNS_FASTER_AFTER = 10
+"""Packets that may be lost before the limit of the rate grows with their number."""
+
 
 class PacketScreen:
     """Holds back a packet that differs too much from the last good one, unless the next agrees with it.
@@ -26,8 +29,15 @@ class PacketScreen:
         """Believe the next packet whatever it is."""
         self._last = self._suspect = None
 
-    def is_wild(self, rate_rad_s: float, ax: float, ay: float) -> bool:
-        """Return whether the packet shall not be integrated; NaN and infinity are wild."""
+    def is_wild(self, rate_rad_s: float, ax: float, ay: float, packets: float = 1.0) -> bool:
+        """Return whether the packet shall not be integrated; NaN and infinity are wild.
+
+        Args:
+            rate_rad_s: read.
+            ax: read.
+            ay: read.
+            packets: since the one before, lost ones counted: after a hole a vehicle may turn faster.
+        """
         last = self._last
         if last is None:
             if self._is_beyond_scale(rate_rad_s, ax, ay):
@@ -35,8 +45,9 @@ class PacketScreen:
             self._last = (rate_rad_s, ax, ay)
             return False
         rate, force = self.max_rate_step, self.max_acc_step
+        wider = rate * max(1.0, packets / TURNS_FASTER_AFTER)
         if (
-            -rate <= rate_rad_s - last[0] <= rate
+            -wider <= rate_rad_s - last[0] <= wider
             and -force <= ax - last[1] <= force
             and -force <= ay - last[2] <= force
         ):

@@ -113,7 +113,7 @@ class OracleReckoner:
         if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
             self._warm(temperature_c)
         hole = 0.0
-        if self._screen.is_wild(rate, ax, ay):
+        if self._screen.is_wild(rate, ax, ay, dt / self._period):
             self._counters.add("packet_wild")
             rate, ax, ay, hole = self._rate_read, self._ax, self._ay, 1.0
         if dt > 1.5 * self._period:

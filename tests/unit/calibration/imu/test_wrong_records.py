@@ -149,6 +149,22 @@ def test_a_dead_channel_is_named_and_the_others_stay_right(rest, channel, level,
                 assert found[name]["value"] == pytest.approx(quantity["value"], abs=0.5 * quantity["std"])
 
 
+@pytest.mark.parametrize("channel", [1, 2, 3])
+@pytest.mark.parametrize("command", ["allan", "zero-offset"])
+def test_a_channel_that_was_stuck_for_a_while_is_left_out(rest, channel, command):
+    plain = rest.calibrate(command)
+    rest.imu[150:400, channel] = rest.imu[150, channel]
+    found = rest.calibrate(command)
+    stuck = NAMES[channel - 1]
+    assert f"{stuck} was stuck: it has the same reading in 25" in rest.output
+    for name, quantity in plain.items():
+        if isinstance(quantity, dict) and "std" in quantity:
+            if name.startswith(stuck):
+                assert name not in found
+            else:
+                assert found[name]["value"] == pytest.approx(quantity["value"], abs=0.5 * quantity["std"])
+
+
 def test_without_a_living_channel_nothing_is_written(rest):
     rest.imu[:, 1:4] = 0.0
     with pytest.raises(UsageError, match=r"omega reads 0 in 100 %.*ax reads 0.*ay reads 0"):

@@ -51,6 +51,26 @@ def test_a_hole_is_bridged_and_widens_the_sigmas(flying):
     assert math.hypot(state.x_m, state.y_m) < 0.01
 
 
+@pytest.mark.parametrize("hole_ms", [300, 500, 1500])
+@pytest.mark.parametrize("sudden", [0.0, 0.3])
+def test_a_vehicle_that_turned_faster_in_a_hole_is_where_it_is_within_three_sigma(flying, hole_ms, sudden):
+    faster = math.radians(10.0) * hole_ms * 1e-3
+    for t in range(3010, 3501, 10):
+        narrow = flying.add_imu(ImuPacket(t * MS, 0.01, 0.0, 0.0, 0.0, 25.0)).sigma_heading_rad
+    for k in range(101):
+        t = 3500 + hole_ms + 10 * k
+        dt_s = 1e-3 * hole_ms if k == 0 else 0.01
+        state = flying.add_imu(ImuPacket(t * MS, dt_s, faster, 0.0, 0.0, 25.0))
+        # evenly in the hole, or all of it some way off its middle
+        turned = faster * ((0.5 + sudden) * 1e-3 * hole_ms + 0.01 * k)
+        if k in (0, 30, 100):
+            assert abs(state.heading_rad - turned) < 3.0 * state.sigma_heading_rad + 1e-4
+            assert abs(state.rate_rad_s - faster) < 2e-3
+            assert not state.is_lost
+    assert "packet_wild" not in flying.counters.by_name
+    assert state.sigma_heading_rad > narrow
+
+
 def test_a_long_hole_in_flight_is_called_lost_until_a_fix_agrees(flying, fix_covariance):
     state = flying.add_imu(ImuPacket(8000 * MS, 5.0, 0.0, 0.0, 0.0, 25.0))
     assert state.is_lost
