@@ -87,7 +87,15 @@ def run_lockstep(
                 runner.close()
             recorder.finish()
     except BaseException:
-        with suppress(RecordingError):  # then what is there can be recovered
-            recorder.end_early()
+        _end(recorder)
         raise
     return faults
+
+
+def _end(recorder: Recorder) -> None:
+    """Finish what was recorded until something failed; if the disk is what failed, what it has taken."""
+    try:
+        recorder.finish()
+    except RecordingError:
+        with suppress(RecordingError):  # then what is there can be recovered
+            recorder.end_early()

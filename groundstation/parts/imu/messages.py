@@ -1,6 +1,5 @@
 """What the IMU block states, from bytes to calibrated samples."""
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -33,7 +32,7 @@ class ImuBytes(Message):
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ImuBytes"
     TOPIC: ClassVar = Topic("imu_bytes", 100, Rank.SENSOR)
     data: Bytes
-    latency_timer_s: F64 = math.nan
+    latency_timer_s: F64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

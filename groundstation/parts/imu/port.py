@@ -38,7 +38,7 @@ class ImuPort(Port):
         if isinstance(data, _Read):
             return ImuBytes(stamp_ns, self.vehicle, data.data, data.latency_timer_s)
         assert isinstance(data, bytes)
-        return ImuBytes(stamp_ns, self.vehicle, data)
+        return ImuBytes(stamp_ns, self.vehicle, data, math.nan)
 
     def writes(self) -> tuple[tuple[type[Message], str], ...]:
         return ((ImuOrder, self.vehicle),)

@@ -88,7 +88,7 @@ class CanIn(Message):
     TOPIC: ClassVar = Topic("can_in", 100, Rank.VALVES, scope=Scope.RIG)
     arbitration_id: U32
     data: Bytes
-    passed: U32 = 1
+    passed: U32
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,7 +39,7 @@ class ValveBus(Port):
         if isinstance(data, BusArrival):
             return CanIn(stamp_ns, "", data.frame.arbitration_id, data.frame.data, data.passed)
         assert isinstance(data, CanFrame)
-        return CanIn(stamp_ns, "", data.arbitration_id, data.data)
+        return CanIn(stamp_ns, "", data.arbitration_id, data.data, 1)
 
     def writes(self) -> tuple[tuple[type[Message], str], ...]:
         return tuple((CanOut, vehicle) for vehicle in self.vehicles)

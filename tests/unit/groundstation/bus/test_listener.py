@@ -30,7 +30,7 @@ def fields_of(payload):
     return {name: getattr(payload, name) for name in type(payload).__dataclass_fields__}
 
 
-@pytest.mark.parametrize(("payload", "owner"), [(WRENCH, "alpha"), (CanIn(5, "", 0x181, b"abc"), "")])
+@pytest.mark.parametrize(("payload", "owner"), [(WRENCH, "alpha"), (CanIn(5, "", 0x181, b"abc", 1), "")])
 def test_a_message_of_ours_comes_with_its_envelope(decoder, payload, owner):
     delivered = decoder.decode(remote(payload, owner))
     assert isinstance(delivered, Delivered)

@@ -1,5 +1,7 @@
 """A small flight to record: two vehicles, every kind of scope, an image now and then."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -41,10 +43,10 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     for step in range(steps):
         now_ns = (step + 1) * PERIOD_NS
         for vehicle in ("alpha", "bravo"):
-            publish(ImuBytes(now_ns, vehicle, random.bytes(62)), now_ns)
+            publish(ImuBytes(now_ns, vehicle, random.bytes(62), math.nan), now_ns)
             force = tuple(random.normal(size=2).tolist())
             publish(Wrench(now_ns, vehicle, *force, 0.0, 0.0, 0.0, float(random.normal())), now_ns)
-        publish(CanIn(now_ns, "", 0x181, random.bytes(8)), now_ns)
+        publish(CanIn(now_ns, "", 0x181, random.bytes(8), 1), now_ns)
         if step % 7 == 0:
             publish(StarImage(now_ns, "alpha", now_ns - 1, 8, 8, "mono8", 8, random.bytes(64)), now_ns)
             publish(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)

@@ -1,5 +1,6 @@
 """A node that raises ends the flight with one sentence that names it; the recording holds what there was."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -28,7 +29,7 @@ def rig_of_one():
 
 
 CALLS = ("start", "receive", "tick", "stop")
-BYTES = Delivered(Envelope(ImuBytes.TOPIC, "alpha", 1, 5), ImuBytes(5, "alpha", b""))
+BYTES = Delivered(Envelope(ImuBytes.TOPIC, "alpha", 1, 5), ImuBytes(5, "alpha", b"", math.nan))
 
 
 def raised(error):

@@ -1,5 +1,6 @@
 """A replay tells nodes what they were told then; an unchanged node says the same, bit for bit."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -124,7 +125,7 @@ class Laboratory:
             now_ns = (step + 1) * STEP_NS
             self.publish(now_ns)
             for node in nodes:
-                self.hear(node, ImuBytes(now_ns, node.vehicle, random.bytes(9)), now_ns)
+                self.hear(node, ImuBytes(now_ns, node.vehicle, random.bytes(9), math.nan), now_ns)
                 if step % 13 == 7:
                     self.hear(node, Request(now_ns, node.vehicle, step, "test", "zero", ""), now_ns)
                 if step % 5 == 4:
@@ -199,10 +200,10 @@ def identified(messages):
 
 
 def test_two_replays_give_equal_files(tmp_path, path):
-    for name in ("a", "b"):
+    for name in ("a.mcap", "b.mcap"):
         with Recorder(tmp_path / name, RecordingInfo()) as output:
             replay(path, output=output)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
 def test_one_vehicle_can_be_replayed_alone(path):

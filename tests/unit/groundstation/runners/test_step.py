@@ -1,5 +1,6 @@
 """The step: who receives what, busy nodes, ports; the same for every runner."""
 
+import math
 from dataclasses import dataclass, field
 
 import pytest
@@ -58,7 +59,7 @@ class Line(Port):
     reads = ImuBytes
 
     def to_message(self, stamp_ns, data):
-        return ImuBytes(stamp_ns, self.vehicle, data)
+        return ImuBytes(stamp_ns, self.vehicle, data, math.nan)
 
     def writes(self):
         return ((ImuOrder, self.vehicle),)
@@ -169,7 +170,7 @@ def test_what_belongs_to_the_whole_rig_is_received_by_nodes_of_vehicles():
     node = Taker("alpha", CanIn)
     assert list(inputs_of(node)) == [(CanIn, ("can_in", ""))]
     bench = Bench(node)
-    bench.step.deliver(delivered(CanIn(5, "", 0x181, b"")), 6)
+    bench.step.deliver(delivered(CanIn(5, "", 0x181, b"", 1)), 6)
     assert len(node.taken) == 1
 
 

@@ -56,7 +56,7 @@ class Driven:
         """One of each message: all is well."""
         return (
             state("alpha"), status_of_fusion(), Findings(0, "alpha", (), ()),
-            ValveStatus(0, "alpha", 0, 0, armed, False, floating, math.nan, 0, 60.0),
+            ValveStatus(self.now_ns, "alpha", 0, 0, armed, False, floating, math.nan, 0, 60.0),
             ValveDemand(0, "alpha", bytes(8), (0.0, 0.0), 0.0),
         )  # fmt: skip
 
@@ -174,10 +174,12 @@ class TestWhatItSees:
 
     def test_the_valve_node(self, node):
         node.now_ns = 5
-        node.receive(ValveStatus(0, "alpha", 1, 2, True, False, False, 30e5, 8, 61.0))
+        node.receive(ValveStatus(5, "alpha", 1, 2, True, False, False, 30e5, 8, 61.0))
         seen = node.known.node
         assert (seen.arrival_ns, seen.armed, seen.floating, seen.dead_man) == (5, True, False, False)
         assert (seen.pressure_pa, seen.faults) == (30e5, 8)
+        node.receive(ValveStatus(2, "alpha", 1, 2, True, False, False, 30e5, 8, 61.0))
+        assert node.known.node.arrival_ns == 2, "it waited somewhere: it is as old as its arrival"
 
     def test_demands_and_findings(self, node):
         node.now_ns = 5

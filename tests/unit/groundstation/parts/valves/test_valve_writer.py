@@ -36,7 +36,7 @@ def ruling(*, air_on):
 
 def arrive(writer, message, now_ms=0):
     frame = encode(message)
-    return list(writer.receive(CanIn(now_ms * MS, "", frame.arbitration_id, frame.data), now_ms * MS))
+    return list(writer.receive(CanIn(now_ms * MS, "", frame.arbitration_id, frame.data, 1), now_ms * MS))
 
 
 def status(vehicle=INDEX, **changes):
@@ -102,7 +102,7 @@ class TestAir:
 class TestReports:
     def test_a_status_that_waited_has_the_age_it_has(self, writer):
         frame = encode(status())
-        (reported,) = writer.receive(CanIn(20 * MS, "", frame.arbitration_id, frame.data), 2_500 * MS)
+        (reported,) = writer.receive(CanIn(20 * MS, "", frame.arbitration_id, frame.data, 1), 2_500 * MS)
         assert reported.stamp_ns == 20 * MS
 
     @pytest.mark.parametrize("passed", [1, 160])
@@ -134,7 +134,7 @@ class TestReports:
         assert len(list(writer.tick(0))) == 1
 
     def test_frames_that_are_none_are_ignored(self, writer):
-        assert list(writer.receive(CanIn(0, "", 0x7FF, b"\x01"), 0)) == []
+        assert list(writer.receive(CanIn(0, "", 0x7FF, b"\x01", 1), 0)) == []
 
 
 class TestButton:
