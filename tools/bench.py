@@ -44,7 +44,9 @@ from bench.fusion import folder as fusion_folder  # noqa: E402
 from bench.fusion import peers as fusion_peers  # noqa: E402
 from bench.fusion import speed as fusion_speed  # noqa: E402
 from bench.rows import Bench, Measure, Row  # noqa: E402
+from bench.star import bound as star_bound  # noqa: E402
 from bench.star import damage as star_damage  # noqa: E402
+from bench.star import few as star_few  # noqa: E402
 from bench.star import folder as star_folder  # noqa: E402
 from bench.star import frames as star_frames  # noqa: E402
 from bench.star import lights as star_lights  # noqa: E402
@@ -67,6 +69,8 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "parser": parser.measure,
         "many_mock_ups": many_mock_ups.measure,
         "star": star_frames.measure,
+        "star_bound": star_bound.measure,
+        "star_few": star_few.measure,
         "star_lights": star_lights.measure,
         "star_damage": star_damage.measure,
         "star_sky": star_sky.measure,

@@ -16,7 +16,7 @@ typedef struct {
     int32_t first, size; /* its pixels */
     double u_px, v_px, flux_dn;
     Symmetric spread_px2, covariance_px2; /* second moments; covariance of the centre */
-    Symmetric shape_px2;           /* of the Gaussian that is fitted */
+    double half_px, angle_rad;            /* of a streak, as its fit begins; half_px is 0 of a round spot */
 } Spot;
 
 /* Fit the centre and light of `count` spots whose first and size are given, brightest first into `fitted`;

@@ -11,16 +11,18 @@ from oracles.robust import middle_value
 
 Vector = NDArray[np.float64]
 
-_STEPS = 2
-_LINE_PX = 3.0  # half length from where a streak is a line and no longer an oval
+_STEPS, _STREAK_STEPS = 2, 3
 _ROOT_2PI = float(np.sqrt(2.0 * np.pi))
-_MAX_STEP_PX = 2.0
+_MAX_STEP_PX, _MAX_TURN_RAD, _MIN_HALF_PX = 2.0, 0.3, 0.5
 _OUTLIER_SIGMAS = 5.0
 _MISFIT_RATIO = 0.3  # the true image is no Gaussian: so much of the model is no outlier
-_STREAK_RATIO2 = 2.0  # long over short axis, squared, from where a spot counts as a streak
+_STREAK_RATIO2 = 2.0  # long over short axis, squared, from where one spot counts as a streak
+_MOVING_RATIO2 = 1.25  # the same, from where half of the spots say that all are streaks
+_MIN_STREAK2_PX2 = 0.3  # spread along a streak that a fit begins with
 _MAX_FIT_PX = 2000  # what covers more is a lamp or a window, no star: its moments do
 _TRUNCATION = 1.12  # second moments over a finite footprint come out this much too small
 _WIDTH2_LIMITS_PX2 = (0.3, 16.0)
+_TOLD_SHARE = 1e-9  # an unknown of which the others leave less is held
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,24 +84,31 @@ class FittedSpots:
 
 
 def fit_spots(pixels: SpotPixels) -> FittedSpots:
-    """Fit every spot's centre and light, all spots at once.
+    """Fit every spot's centre and light, and of streaks length and direction, all spots at once.
 
     Moments give the first guess and the shape: one width for the picture, and a streak for every spot
-    whose second moments say so. Then Gauss-Newton steps fit a Gaussian of that shape to the pixels,
-    weighted by read and shot noise, saturated pixels and outliers left out.
+    whose second moments say so, or for all of a picture that was taken in motion. Then Gauss-Newton steps
+    fit a Gaussian of that width (a line blurred by it, for streaks) to the pixels, weighted by read and
+    shot noise, saturated pixels and outliers left out.
     """
     guess = _moments(pixels)
-    shape = _shapes(guess)
-    u, v, flux, covariance, trusted = _gauss_newton(pixels, guess, shape)
-    half = 0.5 * (shape[0] + shape[2])
-    spread = np.hypot(0.5 * (shape[0] - shape[2]), shape[1])
+    width2, half, angle = _shapes(guess)
+    first = np.stack((guess.u_px, guess.v_px, guess.flux_dn, half, angle))
+    at, covariance = first.copy(), guess.covariance_px2.copy()
+    for is_streak in (False, True):
+        some = ((half > 0.0) == is_streak) & (pixels.size <= _MAX_FIT_PX)
+        if some.any():
+            fitted, of_centre, trusted = _gauss_newton(pixels.keep(some), first[:, some], width2, is_streak)
+            found = np.flatnonzero(some)[trusted]
+            at[:, found], covariance[:, found] = fitted[:, trusted], of_centre[:, trusted]
+    u, v, flux, half, angle = at
     return FittedSpots(
-        u_px=np.where(trusted, u, guess.u_px),
-        v_px=np.where(trusted, v, guess.v_px),
-        flux_dn=np.where(trusted, flux, guess.flux_dn),
-        covariance_px2=np.where(trusted, covariance, guess.covariance_px2).T.copy(),
-        elongation=np.sqrt((half + spread) / np.maximum(half - spread, 1e-3)),
-        streak_px=_streaks(shape),
+        u_px=u,
+        v_px=v,
+        flux_dn=flux,
+        covariance_px2=covariance.T.copy(),
+        elongation=np.sqrt(1.0 + half * half / (3.0 * width2)),
+        streak_px=np.stack((2.0 * half * np.cos(angle), 2.0 * half * np.sin(angle)), axis=1),
     )
 
 
@@ -128,131 +137,100 @@ def _moments(pixels: SpotPixels) -> _Moments:
     return _Moments(flux, u, v, spread, covariance)
 
 
-def _shapes(moments: _Moments) -> Vector:
-    """Give the Gaussian shape (uu, uv, vv; (3, n)) of every spot: round unless it surely is a streak."""
+def _shapes(moments: _Moments) -> tuple[float, Vector, Vector]:
+    """Give the width squared, and of every spot half the length (0: round) and direction of its streak."""
     uu, uv, vv = moments.spread_px2
     half, spread = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
     width2 = min(max(_TRUNCATION * middle_value(half - spread), _WIDTH2_LIMITS_PX2[0]), _WIDTH2_LIMITS_PX2[1])
-    long2 = half + spread
-    streaked = long2 > _STREAK_RATIO2 * np.maximum(half - spread, width2 / _TRUNCATION)
-    # The part of the spread beyond the round image is the streak's, along its own direction.
-    extra = np.where(streaked, np.maximum(long2 - width2, 0.0), 0.0)
-    angle2 = np.arctan2(2.0 * uv, uu - vv)
-    cosine2, sine2 = np.cos(angle2), np.sin(angle2)
-    return np.stack(
-        (
-            width2 + 0.5 * extra * (1.0 + cosine2),
-            0.5 * extra * sine2,
-            width2 + 0.5 * extra * (1.0 - cosine2),
-        )
-    )
-
-
-def _streaks(shape: Vector) -> Vector:
-    """Give the streak (du, dv) of every spot, (n, 2): a uniform line of length l spreads l^2 / 12."""
-    uu, uv, vv = shape
-    length = np.sqrt(12.0 * 2.0 * np.hypot(0.5 * (uu - vv), uv))
+    ratio = (half + spread) / np.maximum(half - spread, width2 / _TRUNCATION)
+    streaked = (ratio > _STREAK_RATIO2) | (middle_value(ratio) > _MOVING_RATIO2)
+    # The part of the spread beyond the round image is the streak's: a line of length l spreads l^2 / 12.
+    extra = np.maximum(half + spread - width2, _MIN_STREAK2_PX2)
     angle = 0.5 * np.arctan2(2.0 * uv, uu - vv)
-    return np.stack((length * np.cos(angle), length * np.sin(angle)), axis=1)
+    return width2, np.where(streaked, np.sqrt(3.0 * extra), 0.0), np.where(streaked, angle, 0.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Line:
-    """Images of long streaks: a line of light blurred by the round image of a star.
+def _round_image(du: Vector, dv: Vector, flux: Vector, width2: float) -> tuple[Vector, ...]:
+    """Image of light one; derivatives of the spot by its centre and light."""
+    unit = np.exp(-0.5 * (du * du + dv * dv) / width2) / (2.0 * np.pi * width2)
+    return flux * unit * du / width2, flux * unit * dv / width2, unit
 
-    Attributes:
-        cosine: Direction, shape (n,).
-        sine: Direction, shape (n,).
-        half_px: Half length; zero for what is no long streak, shape (n,).
-        width_px: One sigma of the round image, shape (n,).
-    """
 
-    cosine: Vector
-    sine: Vector
-    half_px: Vector
-    width_px: Vector
-
-    @classmethod
-    def of(cls, streak_px: Vector, shape: Vector) -> "_Line":
-        length = np.hypot(streak_px[:, 0], streak_px[:, 1])
-        safe = np.maximum(length, 1e-9)
-        half, spread = 0.5 * (shape[0] + shape[2]), np.hypot(0.5 * (shape[0] - shape[2]), shape[1])
-        width = np.sqrt(np.maximum(half - spread, _WIDTH2_LIMITS_PX2[0]))
-        return cls(streak_px[:, 0] / safe, streak_px[:, 1] / safe, 0.5 * length, width)
-
-    def put(
-        self, owner: NDArray[np.int64], du: Vector, dv: Vector, unit: Vector, d_u: Vector, d_v: Vector
-    ) -> None:
-        """Write the image and its derivatives by the centre over those of Gaussians, in place."""
-        pixel = np.flatnonzero((self.half_px > _LINE_PX)[owner])
-        own = owner[pixel]
-        c, s, half, width = self.cosine[own], self.sine[own], self.half_px[own], self.width_px[own]
-        along = du[pixel] * c + dv[pixel] * s
-        across = (dv[pixel] * c - du[pixel] * s) / width
-        front, back = (along + half) / width, (along - half) / width
-        profile = (ndtr(front) - ndtr(back)) / (2.0 * half)
-        slope = (np.exp(-0.5 * back * back) - np.exp(-0.5 * front * front)) / (2.0 * half * width * _ROOT_2PI)
-        side = np.exp(-0.5 * across * across) / (width * _ROOT_2PI)
-        by_along, by_across = slope * side, profile * side * across / width
-        unit[pixel] = profile * side
-        d_u[pixel] = by_along * c - by_across * s
-        d_v[pixel] = by_along * s + by_across * c
+def _line_image(
+    du: Vector, dv: Vector, flux: Vector, half: Vector, angle: Vector, width: float
+) -> tuple[Vector, ...]:
+    """The same of a line, and by half its length and by its ends moving sideways."""
+    c, s = np.cos(angle), np.sin(angle)
+    along, off = du * c + dv * s, dv * c - du * s
+    front, back = (along + half) / width, (along - half) / width
+    at_front, at_back = np.exp(-0.5 * front * front), np.exp(-0.5 * back * back)
+    side = np.exp(-0.5 * (off / width) ** 2) / (width * _ROOT_2PI)
+    unit = (ndtr(front) - ndtr(back)) / (2.0 * half) * side
+    ends = side / (2.0 * half * width * _ROOT_2PI)
+    by_along, by_across = (at_back - at_front) * ends, unit * off / width**2
+    return (
+        flux * (by_along * c - by_across * s),
+        flux * (by_along * s + by_across * c),
+        unit,
+        flux * ((at_front + at_back) * ends - unit / half),
+        flux * (by_across * along - by_along * off) / half,
+    )
 
 
 def _gauss_newton(
-    pixels: SpotPixels, guess: _Moments, shape: Vector
-) -> tuple[Vector, Vector, Vector, Vector, NDArray[np.bool_]]:
-    """Fit centre and light with the shapes held; give also covariance (3, n) and whether to trust it."""
+    pixels: SpotPixels, first: Vector, width2: float, is_streak: bool
+) -> tuple[Vector, Vector, NDArray[np.bool_]]:
+    """Fit centre, light, half length and angle (5, n); give also the centre's covariance (3, n), and whether
+    to trust it."""
     starts, owner = pixels.starts, pixels.owner
-    determinant = shape[0] * shape[2] - shape[1] ** 2
-    a, b, c = (
-        (shape[2] / determinant)[owner],
-        (-shape[1] / determinant)[owner],
-        (shape[0] / determinant)[owner],
-    )
-    norm = 1.0 / (2.0 * np.pi * np.sqrt(determinant))
-    streak = _streaks(shape)
-    line = _Line.of(streak, shape)
-    is_line = bool((line.half_px > _LINE_PX).any())
-    u, v, flux = guess.u_px.copy(), guess.v_px.copy(), guess.flux_dn.copy()
-    usable = ~pixels.is_saturated
-    covariance = guess.covariance_px2
-    trusted = pixels.size <= _MAX_FIT_PX
-    for step in range(_STEPS):
-        du, dv = pixels.u_px - u[owner], pixels.v_px - v[owner]
-        along_u, along_v = a * du + b * dv, b * du + c * dv
-        unit = norm[owner] * np.exp(-0.5 * (along_u * du + along_v * dv))
-        d_unit_u, d_unit_v = unit * along_u, unit * along_v
-        if is_line:
-            line.put(owner, du, dv, unit, d_unit_u, d_unit_v)
-        model = flux[owner] * unit
+    at, usable = first.copy(), ~pixels.is_saturated
+    trusted, covariance = np.ones(len(starts), dtype=bool), np.zeros((3, len(starts)))
+    steps = _STREAK_STEPS if is_streak else _STEPS
+    for step in range(steps):
+        u, v, flux, half, angle = at[:, owner]
+        du, dv = pixels.u_px - u, pixels.v_px - v
+        if is_streak:
+            slope = np.stack(_line_image(du, dv, flux, half, angle, float(np.sqrt(width2))))
+        else:
+            slope = np.stack(_round_image(du, dv, flux, width2))
+        model = flux * slope[2]
         error = pixels.light_dn - model
         variance = pixels.variance_dn2 + pixels.gain_dn_per_electron * np.maximum(model, 0.0)
-        if step == _STEPS - 1:
+        if step == steps - 1:
             usable = usable & (error * error < _OUTLIER_SIGMAS**2 * variance + (_MISFIT_RATIO * model) ** 2)
-        weight = usable / variance
-        d_u, d_v = flux[owner] * d_unit_u, flux[owner] * d_unit_v
-        w_u, w_v, w_f = weight * d_u, weight * d_v, weight * unit
-        products = np.stack(
-            (
-                *(w_u * d_u, w_u * d_v, w_v * d_v),
-                *(w_u * unit, w_v * unit, w_f * unit),
-                *(w_u * error, w_v * error, w_f * error),
-            )
-        )
-        n_uu, n_uv, n_vv, n_uf, n_vf, n_ff, g_u, g_v, g_f = np.add.reduceat(products, starts, axis=1)
-        # Eliminate the light, then solve the 2x2 system of the centre.
-        n_ff = np.maximum(n_ff, 1e-300)
-        n_uu, n_uv, n_vv = n_uu - n_uf * n_uf / n_ff, n_uv - n_uf * n_vf / n_ff, n_vv - n_vf * n_vf / n_ff
-        h_u, h_v = g_u - n_uf * g_f / n_ff, g_v - n_vf * g_f / n_ff
-        det = n_uu * n_vv - n_uv * n_uv
-        trusted &= (det > 0.0) & (n_uu > 0.0)
-        det = np.where(trusted, det, 1.0)
-        step_u, step_v = (n_vv * h_u - n_uv * h_v) / det, (n_uu * h_v - n_uv * h_u) / det
-        trusted &= (np.abs(step_u) < _MAX_STEP_PX) & (np.abs(step_v) < _MAX_STEP_PX)
-        step_u, step_v = np.where(trusted, step_u, 0.0), np.where(trusted, step_v, 0.0)
-        u, v = u + step_u, v + step_v
-        flux = flux + np.where(trusted, (g_f - n_uf * step_u - n_vf * step_v) / n_ff, 0.0)
-        covariance = np.stack((n_vv, -n_uv, n_uu)) / det
-    trusted &= flux > 0.0
-    return u, v, flux, covariance, trusted
+        weighted = slope * (usable / variance)
+        normal = np.add.reduceat(weighted[:, None] * slope, starts, axis=2)
+        gradient = np.add.reduceat(weighted * error, starts, axis=1)
+        for spot in np.flatnonzero(trusted):
+            solved = _solve(normal[..., spot], gradient[:, spot])
+            trusted[spot] = solved is not None
+            if solved is not None:
+                x, covariance[:, spot] = solved
+                at[:3, spot] += x[:3]
+                if is_streak:
+                    low, high = max(0.5 * at[3, spot], _MIN_HALF_PX), max(1.5 * at[3, spot], _MIN_HALF_PX)
+                    at[3, spot] = np.clip(at[3, spot] + x[3], low, high)
+                    at[4, spot] += np.clip(x[4] / at[3, spot], -_MAX_TURN_RAD, _MAX_TURN_RAD)
+    trusted &= at[2] > 0.0
+    return at, covariance, trusted
+
+
+def _solve(normal: Vector, gradient: Vector) -> tuple[Vector, tuple[float, float, float]] | None:
+    """One step and the centre's covariance; None where it cannot be trusted."""
+    n, g, x = normal.copy(), gradient.copy(), np.zeros(len(gradient))
+    alone, told = np.diag(normal).copy(), []
+    for k in range(len(g) - 1, 1, -1):
+        if n[k, k] > _TOLD_SHARE * alone[k]:
+            ratio = n[:k, k] / n[k, k]
+            n[:k, :k] -= np.outer(ratio, n[k, :k])
+            g[:k] -= ratio * g[k]
+            told.append(k)
+    determinant = n[0, 0] * n[1, 1] - n[0, 1] ** 2
+    if not (determinant > 0.0 and n[0, 0] > 0.0):
+        return None
+    x[:2] = np.array([[n[1, 1], -n[0, 1]], [-n[0, 1], n[0, 0]]]) @ g[:2] / determinant
+    if not (np.abs(x[:2]) < _MAX_STEP_PX).all():
+        return None
+    for k in reversed(told):
+        x[k] = (g[k] - n[k, :k] @ x[:k]) / n[k, k]
+    return x, (n[1, 1] / determinant, -n[0, 1] / determinant, n[0, 0] / determinant)

@@ -36,7 +36,7 @@ class Laboratory:
         self.leds = read_ceiling(CEILING_FILE)
         self.optics = read_camera(CAMERA_FILE)
         self.sky = build_sky(self.leds, np.random.SeedSequence(seed))
-        self._settings = SensorSettings()
+        self.settings = SensorSettings()
         self._number = 0
         self._cameras: dict[tuple[float, float], SkyCamera] = {}
 
@@ -55,7 +55,7 @@ class Laboratory:
         if key not in self._cameras:
             seed = np.random.SeedSequence(7)
             shutter = Shutter(exposure_s, readout_s)
-            self._cameras[key] = SkyCamera(self.optics, self.sky, shutter, self._settings, seed)
+            self._cameras[key] = SkyCamera(self.optics, self.sky, shutter, self.settings, seed)
         half = 0.5 * (exposure_s + readout_s) * np.asarray(velocity)
         self._number += 1
         start, end = np.asarray(pose) - half, np.asarray(pose) + half
@@ -74,8 +74,8 @@ class Laboratory:
             (self.rng.uniform(low, high, (count, 2)), self.rng.uniform(-np.pi, np.pi, count))
         )
 
-    def frames(self, tag: str, count: int) -> Iterator[Frame]:
-        """Frames of one kind."""
+    def frames(self, tag: str, count: int, stars: tuple[int, int] = (4, 10)) -> Iterator[Frame]:
+        """Frames of one kind; sparse ones show so many stars, from first to last."""
         rng, leds = self.rng, len(self.leds)
         for pose in self.poses(count):
             velocity, exposure, changes = np.zeros(3), 0.01, {}
@@ -89,7 +89,7 @@ class Laboratory:
             if tag in ("leds-out", "mixed"):
                 self.sky.kill(np.flatnonzero(rng.random(leds) < rng.uniform(0.2, 0.5)))
             if tag == "sparse":
-                self.sky.kill(self._all_but_a_few(pose, int(rng.integers(4, 11))))
+                self.sky.kill(self._all_but_a_few(pose, int(rng.integers(stars[0], stars[1] + 1))))
             if tag == "dark":
                 changes |= {"is_sky_dead": True, "false_lights": float(rng.integers(10, 60))}
             image = self.picture(pose, velocity, exposure, **changes)

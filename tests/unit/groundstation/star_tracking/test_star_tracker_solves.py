@@ -73,6 +73,22 @@ def test_a_few_stars_scattered_over_the_picture_are_enough(painter, tracker, lef
         assert np.hypot(*pose_error(fix, pose)[:2]) < 2e-3
 
 
+@pytest.mark.parametrize(("fewest", "most", "share"), [(4, 4, 0.97), (5, 10, 0.995)])
+def test_few_stars_are_nearly_always_identified_and_never_falsely(painter, tracker, fewest, most, share):
+    rng, found, pictures = np.random.default_rng(20), 0, 400
+    for _ in range(pictures):
+        pose, left = random_pose(rng), int(rng.integers(fewest, most + 1))
+        seen = rng.permutation(painter.visible(pose))[:left]
+        assert len(seen) == left
+        fix = tracker.solve(spots_at(painter.project(*pose)[seen] + rng.normal(0.0, 0.03, (left, 2))))
+        if isinstance(fix, PictureFix):
+            error = pose_error(fix, pose)
+            assert np.hypot(*error[:2]) < 2e-3
+            assert abs(error[2]) < np.deg2rad(0.1)
+            found += 1
+    assert found >= share * pictures
+
+
 def test_three_stars_are_believed_only_with_a_prior(painter, tracker):
     rng = np.random.default_rng(3)
     pose = random_pose(rng)
