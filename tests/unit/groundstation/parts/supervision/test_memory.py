@@ -4,6 +4,7 @@ import json
 import math
 import os
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -156,9 +157,8 @@ class TestFile:
 
         def fsync(handle):
             real(handle)
-            if os.readlink(f"/proc/self/fd/{handle}").startswith(
-                str(path.parent)
-            ):  # threads of others force theirs
+            target = Path(f"/proc/self/fd/{handle}").readlink()
+            if target.is_relative_to(path.parent):  # threads of other tests force theirs
                 handles.append(handle)
                 forced.set()
 
