@@ -188,7 +188,9 @@ class ImuConsistency:
         """
         sums = self._sources.setdefault(source, _Source())
         if used and reason == RESTARTED:
-            self._explain("wrong_fixes", source, sums, "the estimate had to begin again")
+            # of a filter that expects too little it is no wonder, and no witness against the fixes
+            fault = "filter_inconsistent" if "filter_inconsistent" in self._found else "wrong_fixes"
+            self._explain(fault, source, sums, "the estimate had to begin again")
             return
         if used:
             sums.run = 0

@@ -146,6 +146,17 @@ def test_fixes_that_all_lie_to_one_side_leave_open_who_is_wrong():
     assert "316 mm" in checks.findings[0].detail
 
 
+def test_a_filter_that_expects_too_little_and_begins_again_accuses_nobody():
+    rng, checks = np.random.default_rng(3), ImuConsistency(CONFIG)
+    while not checks.findings:
+        account(checks, used=True, nis=min(25.0, float(3.0 * rng.chisquare(3))))
+    account(checks, used=True, reason="starts the estimate again", nis=40.0)
+    assert [finding.id for finding in checks.findings] == ["filter_inconsistent"]
+    for _ in range(12):
+        account(checks, used=False, reason="outside the gate", nis=99.0, innovation=(0.3, 0.1, 0.0))
+    assert "wrong_fixes" in {finding.id for finding in checks.findings}, "a burst is one all the same"
+
+
 def test_an_estimate_that_begins_again_is_a_finding_at_once():
     checks = ImuConsistency(CONFIG)
     account(checks, used=True, reason="starts the estimate again", nis=400.0)
