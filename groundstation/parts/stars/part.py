@@ -26,6 +26,8 @@ from groundstation.parts.stars.sections import StarCameraSection, StarsOfType, S
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
+LINK_SIGMA_S = 0.001
+"""What a link takes beyond the age that a pose states, where the rig says nothing of it."""
 # OpenCV loads only where these run
 _SPOTS = "groundstation.parts.stars.spot_finder:SpotFinder"
 _TRACKER = "groundstation.parts.stars.star_tracker:StarTracker"
@@ -60,7 +62,7 @@ def _floor(rig: Rig, vehicle: str) -> Floor:
 
 def _fix_reader(rig: Rig, vehicle: str) -> Node:
     camera = rig.of_type(vehicle, StarsOfType).star_camera
-    stamp_sigma_s = camera.delay[1] if camera is not None else 0.0
+    stamp_sigma_s = camera.delay[1] if camera is not None else LINK_SIGMA_S
     return FixReader(vehicle, stamp_sigma_s, rig.of_type(vehicle, ImuOfType).imu.usual_spread_s)
 
 
