@@ -11,9 +11,8 @@ from groundstation.supervision.faults import FAULTS
 
 ROOT = Path(__file__).parents[2]
 PROMISES = ("left_table", "hit_neighbour", "floated_unarmed", "open_when_disarmed")
-MAY_GO_UNSEEN = {"leaking_valve", "weak_valve"}
-"""A small leak may look like the slope of the table for a while; a weak valve that is seldom needed is named
-once, and no second time within ten seconds."""
+MAY_GO_UNSEEN = {"leaking_valve"}
+"""A small leak may look like the slope of the table for a while."""
 
 
 @pytest.mark.slow
