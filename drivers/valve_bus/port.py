@@ -108,7 +108,7 @@ class ValveBusPort:
         self._rx_packets = _kernel_counter(config)
         self._rx_before = self._read_kernel_counter()
         if "_apply_filters" in vars(type(self._bus)):  # the adapter or the kernel does it
-            with suppress(can.CanError, NotImplementedError):
+            with suppress(can.CanError, NotImplementedError):  # then all frames come, and are sorted out here
                 self._bus.set_filters(_FILTERS)
 
     def read(self, timeout_s: float) -> tuple[int, CanFrame] | None:

@@ -12,7 +12,16 @@ import math
 
 import numpy as np
 
-from groundstation.fusion.estimator import Array, Counters, Fix, FixOutcome, ImuPacket, Pair, PlanarState
+from groundstation.fusion.estimator import (
+    WAITS,
+    Array,
+    Counters,
+    Fix,
+    FixOutcome,
+    ImuPacket,
+    Pair,
+    PlanarState,
+)
 from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offset_fit import fit_offsets
@@ -87,9 +96,11 @@ class ReintegrationEstimator:
         self._t_ns = packet.t_ns
         t = self._seconds(packet.t_ns)
         self._history.rows.extend((t, packet.dt_s, rate, ax, ay, 0.0, 0.0))
-        for fix in self._waiting:
-            self._accounts.append(self.add_fix(fix))
-        self._waiting.clear()
+        waiting, self._waiting = self._waiting, []
+        for fix in waiting:
+            account = self.add_fix(fix)
+            if account.reason != WAITS:
+                self._accounts.append(account)
         if self._pose is None:
             return None
         if self._rest_from is None:
@@ -186,7 +197,7 @@ class ReintegrationEstimator:
             return self._account(fix, "before the first packet")
         if t > self._seconds(self._t_ns) + 1e-9:
             self._waiting.append(fix)
-            return self._account(fix, "waits for packets")
+            return self._account(fix, WAITS)
         if self._fixes and t <= self._fixes[-1][0]:
             return self._account(fix, "older than the last used")
         if self._rest_from is not None:  # the mean so far, to be shown
