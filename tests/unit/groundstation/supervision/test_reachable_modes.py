@@ -1,49 +1,32 @@
 """Every state that the state machine can reach, explored: what leads out of each, and what never does."""
 
 import itertools
-from dataclasses import replace
 
 import pytest
+from unit.groundstation.supervision.machines import (
+    FLYING,
+    PERSON,
+    PERSONS,
+    STATIONS,
+    S,
+    driven,
+    machine,
+)
 
 from groundstation.supervision.mode_machine import (
     GRACE_S,
-    Memory,
     ModeMachine,
     Then,
 )
 from groundstation.supervision.modes import (
     GROUNDED,
     GUARANTEES,
-    TRANSITIONS,
     Air,
     Event,
     Law,
     Mode,
-    Who,
     transition,
 )
-
-S = 1_000_000_000
-PERSON = "anna"
-PERSONS = sorted({row.event for row in TRANSITIONS if row.who is Who.PERSON})
-STATIONS = sorted({row.event for row in TRANSITIONS if row.who is Who.STATION})
-OF_MODE = {mode: Memory(mode, False, False, Then.FLY, "why", "", 0) for mode in Mode}
-
-
-def machine(mode=Mode.LANDED, **changes):
-    made = ModeMachine(0, starts_by_itself=False)
-    made.memory = replace(OF_MODE[mode], **changes)
-    return made
-
-
-def driven(*events, starts_by_itself=False):
-    made = ModeMachine(0, starts_by_itself=starts_by_itself)
-    for event in events:
-        assert made.apply(event, 0, PERSON if event in PERSONS else "") == ""
-    return made
-
-
-FLYING = (Event.FLY, Event.READY, Event.AIR_IS_ON)
 
 
 def key(made):
