@@ -211,9 +211,8 @@ class TickClock:
             if wraps > 0:
                 elapsed += wraps * modulus
                 late_ns -= wraps * modulus * TICK_NS
-            is_first &= (
-                elapsed != frame.sample_count
-            )  # in sequence by chance, it is late by the whole silence
+            # in sequence by chance, it is late by the whole silence
+            is_first &= elapsed != frame.sample_count
             if elapsed == 0 or not self._fits(late_ns, latest_edge_ns, is_first=is_first):
                 self._restart(raw, latest_edge_ns, late_ns)
                 return None

@@ -1,7 +1,5 @@
 """A CAN adapter as frames with arrival stamps; which adapter, the rig's configuration states."""
 
-import os
-import socket
 import threading
 import time
 from collections import deque
@@ -13,11 +11,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import can
-from can.interfaces.slcan import slcanBus
 from can.typechecking import CanFilter
 
-from drivers.errors import LinkLost, NotFound, Refused
-from drivers.socket_url import check_socket_url
+from drivers.errors import LinkLost
+from drivers.valve_bus.adapter import SLICE_S, open_adapter, prompt_lines, shut_down
 from drivers.valve_bus.frame import BusArrival, CanFrame
 from drivers.valve_bus.messages import SILENCE_CLOSES_S
 from drivers.valve_bus.outbox import Outbox
@@ -30,14 +27,10 @@ from drivers.valve_bus.protocol import (
     STATUS_ID,
     STOP_ID,
 )
-from drivers.valve_bus.slcan_lines import SlcanLines
 
 _VEHICLE_BITS = 0x00F
 _STATION_IDS = frozenset((STOP_ID, ARM_ID, FLOAT_AIR_ID, COMMAND_ID))  # sent by the station, obeyed by nodes
-_SLICE_S = 0.1  # `frames` looks for a close this often
-_DRAIN_S = (
-    0.005  # what comes within is one batch: two hundred a second reach the station, whatever the bus does
-)
+_DRAIN_S = 0.005  # what comes within is one batch: 200 a second reach the station, whatever the bus does
 _RETRY_S = 0.001
 _ECHO_NS = 500_000_000
 _MOST_WAITING = 4096
@@ -96,15 +89,8 @@ class ValveBusPort:
         self._stops_sent: dict[CanFrame, int] = {}
         self._waiting: deque[tuple[int, CanFrame]] = deque(maxlen=_MOST_WAITING)
         self._passed = 0
-        arguments = _with_defaults(config)
-        try:
-            check_socket_url(str(config["channel"]))
-            self._bus = can.Bus(**arguments, ignore_config=True)
-        except Refused as error:
-            raise NotFound(f"the valve bus on {self.name} cannot be opened: {error}") from error
-        except Exception as error:  # whatever a back end raises where its library or its adapter is absent
-            raise NotFound(_why_not(self.name, str(config["interface"]), error)) from error
-        self._lines = _make_prompt(self._bus)
+        self._bus = open_adapter(config, self.name)
+        self._lines = prompt_lines(self._bus)
         self._rx_packets = _kernel_counter(config)
         self._rx_before = self._read_kernel_counter()
         if "_apply_filters" in vars(type(self._bus)):  # the adapter or the kernel does it
@@ -160,7 +146,7 @@ class ValveBusPort:
         """
         while not self._closing.is_set():
             try:
-                arrival = self.read(_SLICE_S)
+                arrival = self.read(SLICE_S)
             except LinkLost:
                 if self._closing.is_set():
                     return
@@ -226,7 +212,7 @@ class ValveBusPort:
         if retrier is not None:
             retrier.join(timeout=1.0)
         with self._reading, self._sending:
-            _shut_down(self._bus)
+            shut_down(self._bus)
 
     def __enter__(self) -> Self:
         return self
@@ -241,7 +227,7 @@ class ValveBusPort:
 
     def _fill(self, timeout_s: float) -> None:
         """Let what comes in wait in order, what concerns nobody here left out."""
-        timeout_s = min(timeout_s, _SLICE_S)
+        timeout_s = min(timeout_s, SLICE_S)
         try:
             if self._lines is None:
                 message = self._bus.recv(timeout_s)
@@ -299,54 +285,7 @@ class ValveBusPort:
             return None
 
 
-def _why_not(name: str, interface: str, error: Exception) -> str:
-    reason = " ".join(str(error).split()) or type(error).__name__
-    sentence = f"the valve bus on {name} cannot be opened: {reason}"
-    if isinstance(error, (can.CanError, OSError, ValueError)) and not isinstance(error, ImportError):
-        return sentence
-    return f"{sentence}; is the library installed that python-can needs for {interface!r}?"
-
-
 def _kernel_counter(config: Mapping[str, Any]) -> Path | None:
     if config["interface"] != "socketcan":
         return None
     return Path("/sys/class/net") / str(config["channel"]) / "statistics" / "rx_packets"
-
-
-def _with_defaults(config: Mapping[str, Any]) -> dict[str, Any]:
-    arguments = dict(config)
-    if arguments["interface"] == "slcan":
-        arguments.setdefault(
-            "timeout", _SLICE_S / 2
-        )  # one byte ends the wait; 1 ms would wake 1000 times a second
-        if str(arguments["channel"]).startswith("socket://"):
-            arguments.setdefault("sleep_after_open", 0.0)
-    return arguments
-
-
-def _make_prompt(bus: can.BusABC) -> SlcanLines | None:
-    """A slcan line must not wait: neither for an acknowledgement (Nagle) nor for ever on a full buffer.
-
-    Returns:
-        Its reader; None where the adapter is another.
-    """
-    port = getattr(bus, "serialPortOrig", None)
-    if port is None:
-        return None
-    port.write_timeout = SILENCE_CLOSES_S
-    if str(port.port).startswith("socket://"):
-        with socket.socket(fileno=os.dup(port.fileno())) as same_socket:
-            same_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return SlcanLines(port.fileno()) if isinstance(bus, slcanBus) else None
-
-
-def _shut_down(bus: can.BusABC) -> None:
-    """On a dead link slcan gives up before it closes its port, and pyserial before it closes its socket."""
-    port = getattr(bus, "serialPortOrig", None)
-    open_socket = getattr(port, "_socket", None)
-    with suppress(can.CanError, OSError):  # that the adapter is dead is no news to somebody who closes it
-        bus.shutdown()
-    if port is not None:
-        port.close()
-    if open_socket is not None:
-        open_socket.close()

@@ -45,7 +45,8 @@ class HoldUp:
     def excess_s(self, now_ns: int) -> float:
         """How much later than usual something that arrives now may be, s; 0 where nothing is held up.
 
-        A sample that should be here by now and is not counts as one that is late.
+        A sample that should be here by now and is not counts as one that is late; with a block that is silent
+        the doubt grows, since nothing tells any more.
         """
         if not self._stamp_ns:
             return 0.0
