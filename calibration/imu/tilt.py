@@ -17,7 +17,7 @@ from calibration.imu.rest_search import find_rests
 from calibration.imu.tilt_axes import Rest, TiltAxes, combination, tilt_axes
 from calibration.imu.zero_offset import NotARest, zero_offset
 from calibration.outcome import CalibrationRefusedError, Outcome
-from calibration.result import Quantity
+from calibration.result import Quantity, quantity_lines
 from groundstation.declarations.errors import UsageError
 from groundstation.files.number_tables import load_table
 from groundstation.fusion.flight_data import Array, FlightData
@@ -167,12 +167,11 @@ def _outcome(found: TiltAxes, rests: int, cut: Sequence[str]) -> Outcome:
     rms = np.sqrt((found.residual_m_s2**2).mean(axis=0))
     words = [f"{rests} rests, chi-square ratio {found.chi_square_ratio:.2f}"]
     words += [f"  cut out: {line}" for line in cut]
-    words += [
-        f"{name}: these rests do not determine it"
-        if math.isnan(quantity.value)
-        else f"{name} = {quantity.value:.6g} ± {quantity.sigma:.2g} {quantity.unit}"
-        for name, quantity in quantities.items()
-    ]
+    for name, quantity in quantities.items():
+        is_known = not math.isnan(quantity.value)
+        words += (
+            quantity_lines({name: quantity}) if is_known else [f"{name}: these rests do not determine it"]
+        )
     words += [f"unknown: {what}" for what in found.unknown]
     return Outcome(
         title="Scale, axes and offsets of the accelerometers",
