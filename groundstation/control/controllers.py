@@ -14,9 +14,11 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel
 
 from groundstation.control.controller import Controller
+from groundstation.control.follow import Follow, FollowConfig
 from groundstation.control.formation import Formation, FormationConfig
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
+from groundstation.control.path import Path, PathConfig
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 
@@ -43,6 +45,7 @@ class ControllerRow(Generic[ConfigT]):
         make: Builds one for a vehicle.
         example: Parameters that the contract tests run it with.
         neighbours: Other vehicles whose states it wants, by its parameters.
+        has_program: It knows by itself where to go; a goal interrupts it until it is resumed.
         is_built_in: It is of the tree; others run in a process of their own.
     """
 
@@ -51,6 +54,7 @@ class ControllerRow(Generic[ConfigT]):
     make: Callable[[ConfigT, VehicleModel, KeepIn | None], Controller]
     example: Mapping[str, Any] = field(default_factory=dict)
     neighbours: Callable[[ConfigT], tuple[str, ...]] = _nobody
+    has_program: bool = False
     is_built_in: bool = False
 
     def build(
@@ -78,6 +82,21 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             Formation,
             {"neighbours": {"leader": {"offset_m": (-0.6, 0.0)}}, "goal_weight": 1.0},
             lambda config: tuple(config.neighbours),
+        ),
+        "path": ControllerRow(
+            "follow waypoints, once or round and round",
+            PathConfig,
+            Path,
+            {"waypoints_m": ((0.3, 0.0), (0.3, 0.3))},
+            has_program=True,
+        ),
+        "follow": ControllerRow(
+            "keep a distance to a leader, and face it",
+            FollowConfig,
+            Follow,
+            {"leader": "leader", "distance_m": 0.8},
+            lambda config: (config.leader,),
+            has_program=True,
         ),
     }
 )

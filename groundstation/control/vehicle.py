@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from groundstation.control.state import Vector2
 
+NEAREST_M = 0.45
+"""Between the centres of two mock-ups: both bodies, and the way that one drifts first."""
 UNIT_TOLERANCE = 1e-6  # rig files are typed by hand: a direction may be off by rounding only
 
 

@@ -44,11 +44,14 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.operation.part import PART as OPERATION
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
+    from groundstation.parts.scenario.part import PART as SCENARIO
     from groundstation.parts.stars.part import PART as STARS
     from groundstation.parts.supervision.part import PART as SUPERVISION
     from groundstation.parts.valves.part import PART as VALVES
 
-    return SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, LABORATORY, REFERENCE
+    return (
+        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, SCENARIO, LABORATORY, REFERENCE,
+    )  # fmt: skip
 
 
 def _load(point: EntryPoint) -> Part:

@@ -12,11 +12,12 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from groundstation.declarations.calls import calling, in_one_line, shortened
+from groundstation.declarations.calls import calling, in_one_line
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.tables import Tables
+from groundstation.declarations.validation import first_sentence
 from groundstation.files.errors import FileError
 from groundstation.files.reading import path_of, read_bytes, text_of
 from groundstation.files.toml_file import toml_of
@@ -109,7 +110,7 @@ def build_rig(
     except FileError as error:
         raise RigError(in_one_line(str(error))) from error
     except ValidationError as error:
-        raise RigError(f"{path}: {_first_sentence(error)}") from error
+        raise RigError(f"{path}: {first_sentence(error)}") from error
     except (RigError, ValueError) as error:
         raise RigError(f"{path}: {in_one_line(str(error))}") from error
     rig.keep_source(Source(content, path))
@@ -198,17 +199,3 @@ def _check_vehicles(rig: Rig) -> None:
                 f"vehicles.{name}.hold: ({hold.x_m:g}, {hold.y_m:g}) m is nearer than "
                 f"{MOCK_UP_RADIUS_M:g} m to the table's edge, or beyond it"
             )
-
-
-def _first_sentence(error: ValidationError) -> str:
-    found = error.errors()
-    typos = [each for each in found if each["type"] == "extra_forbidden"]
-    first = (typos or found)[0]  # a typo in a required key is also a missing key: the typo states more
-    where = ".".join(str(part) for part in first["loc"] if part != "[key]")
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        return f"'{where}' is no known key (a typo?)"
-    if first["type"] == "missing":
-        return f"'{where}' is missing"
-    value = "" if first["type"] == "value_error" else f", found {shortened(repr(first['input']))}"
-    return in_one_line(f"{where + ': ' if where else ''}{message}{value}")

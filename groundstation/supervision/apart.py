@@ -4,9 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from groundstation.control.state import Vector2
-
-NEAREST_M = 0.45
-"""Between the centres of two mock-ups: both bodies, and the way that one drifts first."""
+from groundstation.control.vehicle import NEAREST_M
 
 
 def too_near(name: str, apart_m: float, *, relation: str = "away") -> str:

@@ -21,6 +21,7 @@ from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 from groundstation.supervision.apart import Others
 
 STALE_NS = 300_000_000
+RESUME = "resume"
 STATUS_EVERY = 2
 
 
@@ -31,6 +32,9 @@ class ControllerNode(Node):
         vehicle: Its name.
         law: A row of the table of controllers.
         name: Of that row.
+        holding: Flies to the goal and holds it while the law's own program is interrupted; None where the law
+            has no program and follows the goal itself.
+        waits: The program begins with the request ``resume``.
         goal: Held from the start.
         keep_in: Goals outside are refused.
         neighbours: Other vehicles whose states the law wants, at their full rate.
@@ -54,9 +58,13 @@ class ControllerNode(Node):
         others: tuple[str, ...],
         period_s: float,
         table_map: SlopeGrid | None = None,
+        holding: Controller | None = None,
+        *,
+        waits: bool = False,
     ) -> None:
         super().__init__(vehicle, round(period_s * 1e9))
-        self._law = law
+        self._program, self._holding = law, holding
+        self._law = holding if waits and holding is not None else law
         self._name = name
         self._goal = goal
         self._keep_in = keep_in
@@ -98,6 +106,8 @@ class ControllerNode(Node):
             case Request() if message.action == GO_TO.name:
                 refusal = self._lease.objection(message, now_ns)
                 yield answer(message, now_ns, refusal or self._go_to(message))
+            case Request() if message.action == RESUME and not self._lease.objection(message, now_ns):
+                self._take_over(self._program)  # the supervisor answers
             case Lease():
                 self._lease.take(message)
 
@@ -154,7 +164,13 @@ class ControllerNode(Node):
         refusal = self._others.objection((x, y))
         if not refusal:
             self._goal = Goal((x, y), heading)
+            self._take_over(self._holding or self._program)
         return refusal
+
+    def _take_over(self, law: Controller) -> None:
+        if law is not self._law:
+            law.reset()
+            self._law = law
 
     def _status(self, state: ControlState, now_ns: int) -> ControlStatus:
         setpoint = self._law.setpoint(self._goal)

@@ -17,6 +17,9 @@ from groundstation.parts.supervision.messages import Supervision
 SETTLING_S = 20.0
 """Left out of the report's numbers after the vehicle began to fly."""
 
+JUMP_M, JUMP_RAD = 0.1, math.radians(20.0)
+"""A setpoint that moves farther from one report to the next was set anew."""
+
 Array = NDArray[np.float64]
 
 
@@ -106,7 +109,9 @@ class StationFigure(Figure):
 
 
 def station_errors(truth: Array, goal: Array, since_s: float) -> Array:
-    """Truth against the setpoint in force from a moment on.
+    """Truth against the setpoint from a moment on.
+
+    A setpoint that moves is reported now and then; between two reports it moved evenly, unless it jumped.
 
     Args:
         truth: Rows of t (s), x, y (m), heading (rad), ...; shape (n, 4 or more).
@@ -119,11 +124,18 @@ def station_errors(truth: Array, goal: Array, since_s: float) -> Array:
     truth = truth[truth[:, 0] >= since_s]
     if not len(goal) or not len(truth):
         return np.empty((0, 3))
-    newest = np.searchsorted(goal[:, 0], truth[:, 0], side="right").clip(1, len(goal)) - 1
-    in_force = goal[newest]
-    apart = np.hypot(truth[:, 1] - in_force[:, 1], truth[:, 2] - in_force[:, 2])
-    turn = (truth[:, 3] - in_force[:, 3] + math.pi) % math.tau - math.pi
-    return np.column_stack([truth[:, 0], apart, turn])
+    t = truth[:, 0]
+    after = np.searchsorted(goal[:, 0], t, side="right").clip(1, max(len(goal) - 1, 1))
+    before, after = goal[after - 1], goal[np.minimum(after, len(goal) - 1)]
+    moved = after[:, 1:4] - before[:, 1:4]
+    moved[:, 2] = (moved[:, 2] + math.pi) % math.tau - math.pi
+    span_s = after[:, 0] - before[:, 0]
+    share = np.clip(np.divide(t - before[:, 0], span_s, out=np.zeros_like(t), where=span_s > 0.0), 0.0, 1.0)
+    jumped = (np.hypot(moved[:, 0], moved[:, 1]) > JUMP_M) | (np.abs(moved[:, 2]) > JUMP_RAD)
+    share = np.where(jumped, np.floor(share), share)
+    x, y, heading = (before[:, 1:4] + share[:, None] * moved).T
+    turn = (truth[:, 3] - heading + math.pi) % math.tau - math.pi
+    return np.column_stack([t, np.hypot(truth[:, 1] - x, truth[:, 2] - y), turn])
 
 
 def _off_goal(newest: Newest) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from groundstation.control.controllers import ControllerRow, controllers
+from groundstation.control.controllers import ControllerRow, controllers, make_controller
 from groundstation.control.state import Goal
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
@@ -17,6 +17,9 @@ from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of, neighbours_of
 from groundstation.supervision.apart import too_near
+
+HOLDING = "go_to"
+"""The controller that flies where a program is interrupted."""
 
 
 def _row(rig: Rig, vehicle: str) -> ControllerRow[Any]:
@@ -44,6 +47,8 @@ def _controller(rig: Rig, vehicle: str) -> Node:
         tuple(name for name in rig.vehicles if name != vehicle),
         rig.type_of(vehicle).valves.period_s,
         rig.table.slope_grid(),
+        make_controller(HOLDING, {}, rig.type_of(vehicle).model(), keep_in) if row.has_program else None,
+        waits=section.waits,
     )
 
 

@@ -10,10 +10,15 @@ from groundstation.declarations.section import Section
 
 
 class ControlSection(Section):
-    """Which controller flies a vehicle, and its parameters as that controller defines them."""
+    """Which controller flies a vehicle, and its parameters as that controller defines them.
+
+    A controller with a program of its own (a path, a leader to follow) begins it when the vehicle flies, or,
+    where it ``waits``, with the request ``resume``: until then the vehicle holds its pose.
+    """
 
     controller: str = "station"
     parameters: dict[str, Any] = Field(default_factory=dict)
+    waits: bool = False
 
 
 class ControlOfType(Section):

@@ -1,0 +1,291 @@
+"""Conditions that a timeline waits for: what can be asked, how it is written, when it holds. Pure.
+
+``alpha.settled``, ``alpha.landed``, ``distance_mm(alpha,beta) < 400``; several are joined by ``and``. They are
+judged by what the station believes (the estimate), as an operator would; limits are judged by truth.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from groundstation.control.state import Vector2
+from groundstation.declarations.rig import MOCK_UP_RADIUS_M
+from groundstation.frames import wrap_angle
+from groundstation.supervision.modes import Mode
+
+SETTLED_M, SETTLED_RAD, SETTLED_M_S = 0.010, math.radians(1.0), 0.005
+"""Settled is nearer than this to the setpoint, and slower ..."""
+SETTLED_FOR_NS = 3_000_000_000
+"""... for so long."""
+STALE_NS = 1_000_000_000
+"""What is older is not known."""
+SETTLED = "settled"
+_TERM = re.compile(r"^\s*(?:(\w+)\.(\w+)|(\w+)\(([\w\s,]*)\)\s*(<=|>=|<|>)\s*([-+.\dEeinfa]+))\s*$")
+
+
+class ConditionError(ValueError):
+    """A condition that cannot be understood or can never hold; the text is one sentence."""
+
+
+@dataclass(slots=True)
+class Known:
+    """What is known of one vehicle now.
+
+    Attributes:
+        state_ns: Stamp of the newest state; 0 without one.
+        position_table_m, velocity_table_m_s, heading_rad: Of it.
+        setpoint_ns: When the newest setpoint came; 0 without one.
+        setpoint_table_m, setpoint_heading_rad: What its controller works for.
+        mode: Of its supervisor; empty before it ruled.
+        near_since_ns: Since when it has been within the bounds of *settled*; None while it is not.
+    """
+
+    state_ns: int = 0
+    position_table_m: Vector2 = (math.nan, math.nan)
+    velocity_table_m_s: Vector2 = (math.nan, math.nan)
+    heading_rad: float = math.nan
+    setpoint_ns: int = 0
+    setpoint_table_m: Vector2 = (math.nan, math.nan)
+    setpoint_heading_rad: float = math.nan
+    mode: str = ""
+    near_since_ns: int | None = None
+
+    def look(self, now_ns: int) -> None:
+        """Follow whether it is settled; call at every step."""
+        is_near = (
+            min(self.state_ns, self.setpoint_ns) > now_ns - STALE_NS
+            and self.off_m < SETTLED_M
+            and self.off_rad < SETTLED_RAD
+            and math.hypot(*self.velocity_table_m_s) < SETTLED_M_S
+        )
+        if not is_near:
+            self.near_since_ns = None
+        elif self.near_since_ns is None:
+            self.near_since_ns = now_ns
+
+    @property
+    def off_m(self) -> float:
+        """Distance to the setpoint."""
+        return math.dist(self.position_table_m, self.setpoint_table_m)
+
+    @property
+    def off_rad(self) -> float:
+        """Turn to the setpoint."""
+        return abs(wrap_angle(self.setpoint_heading_rad - self.heading_rad))
+
+    def is_settled(self, since_ns: int, now_ns: int) -> bool:
+        """Whether it has been settled for long enough, not counting what was before a moment."""
+        return (
+            self.near_since_ns is not None and now_ns - max(self.near_since_ns, since_ns) >= SETTLED_FOR_NS
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What the table allows: half-open corners, m."""
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+
+    def edge_m(self, position_table_m: Vector2) -> float:
+        """From the hull to the nearest edge; negative beyond it."""
+        x, y = position_table_m
+        return min(x - self.x_m[0], self.x_m[1] - x, y - self.y_m[0], self.y_m[1] - y) - MOCK_UP_RADIUS_M
+
+    @property
+    def diagonal_m(self) -> float:
+        """The longest way on the table."""
+        return math.hypot(self.x_m[1] - self.x_m[0], self.y_m[1] - self.y_m[0])
+
+
+def _distance_mm(bounds: Bounds, first: Known, second: Known) -> float:
+    del bounds
+    return 1e3 * (math.dist(first.position_table_m, second.position_table_m) - 2 * MOCK_UP_RADIUS_M)
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A number that conditions can ask for.
+
+    Attributes:
+        summary: For people.
+        takes: How many vehicles.
+        value: From what is known of them.
+        high: The largest value there can be, by the table; all are at least ``low``.
+        low: The least.
+    """
+
+    summary: str
+    takes: int
+    value: Callable[..., float]
+    high: Callable[[Bounds], float]
+    low: float = 0.0
+
+
+MEASURES: Mapping[str, Measure] = {
+    "distance_mm": Measure(
+        "between two hulls", 2, _distance_mm, lambda bounds: 1e3 * bounds.diagonal_m
+    ),
+    "edge_mm": Measure(
+        "from the hull to the table's edge",
+        1,
+        lambda bounds, one: 1e3 * bounds.edge_m(one.position_table_m),
+        lambda bounds: 500.0 * bounds.diagonal_m,
+        -math.inf,
+    ),
+    "speed_mm_s": Measure(
+        "of the centre of mass",
+        1,
+        lambda bounds, one: 1e3 * math.hypot(*one.velocity_table_m_s),
+        lambda bounds: math.inf,
+    ),
+    "position_error_mm": Measure(
+        "to the controller's setpoint",
+        1,
+        lambda bounds, one: 1e3 * one.off_m,
+        lambda bounds: 1e3 * bounds.diagonal_m,
+    ),
+    "heading_error_deg": Measure(
+        "to the controller's setpoint", 1, lambda bounds, one: math.degrees(one.off_rad), lambda bounds: 180.0
+    ),
+}
+"""THE TABLE of numbers; beside them ``settled`` and the modes of the supervisor."""
+FLAGS = (SETTLED, *(mode.value for mode in Mode))
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One of the joined conditions.
+
+    Attributes:
+        vehicles: Whom it is about.
+        flag: ``settled`` or a mode; empty for a number.
+        measure: Row of the table; empty for a flag.
+        is_below: Whether the number has to be below the bound.
+        bound: Of the number.
+    """
+
+    vehicles: tuple[str, ...]
+    flag: str = ""
+    measure: str = ""
+    is_below: bool = True
+    bound: float = 0.0
+
+
+@dataclass(slots=True)
+class Condition:
+    """A condition that has been read.
+
+    Attributes:
+        text: As it was written.
+        terms: All have to hold.
+    """
+
+    text: str
+    terms: tuple[Term, ...] = field(default_factory=tuple)
+
+    def holds(self, known: Mapping[str, Known], bounds: Bounds, since_ns: int, now_ns: int) -> bool:
+        """Whether all terms hold; what is not known does not.
+
+        Args:
+            known: By vehicle.
+            bounds: Of the table.
+            since_ns: When the waiting began: *settled* is not counted from before.
+            now_ns: Now.
+        """
+        return all(_holds(term, known, bounds, since_ns, now_ns) for term in self.terms)
+
+
+def _holds(term: Term, known: Mapping[str, Known], bounds: Bounds, since_ns: int, now_ns: int) -> bool:
+    of = [known[name] for name in term.vehicles]
+    if term.flag == SETTLED:
+        return of[0].is_settled(since_ns, now_ns)
+    if term.flag:
+        return of[0].mode == term.flag
+    if any(one.state_ns <= now_ns - STALE_NS for one in of):
+        return False
+    value = MEASURES[term.measure].value(bounds, *of)
+    return value < term.bound if term.is_below else value > term.bound  # False for NaN
+
+
+def plain(condition: Condition) -> str:
+    """The condition without groups: every vehicle by its name."""
+    return " and ".join(map(_spelled, condition.terms))
+
+
+def _spelled(term: Term) -> str:
+    if term.flag:
+        return f"{term.vehicles[0]}.{term.flag}"
+    return f"{term.measure}({','.join(term.vehicles)}) {'<' if term.is_below else '>'} {term.bound:g}"
+
+
+def read_condition(text: str, groups: Mapping[str, tuple[str, ...]], bounds: Bounds) -> Condition:
+    """Read a condition.
+
+    Args:
+        text: As the scenario file spells it.
+        groups: Vehicles by the word for them: each vehicle's own name, ``all``, ``followers``.
+        bounds: Of the table.
+
+    Raises:
+        ConditionError: It is not understood, names what is not there, or can never hold.
+    """
+    terms: list[Term] = []
+    for part in re.split(r"\band\b", text):
+        terms += _terms(part, groups, bounds)
+    return Condition(text, tuple(terms))
+
+
+def _terms(text: str, groups: Mapping[str, tuple[str, ...]], bounds: Bounds) -> list[Term]:
+    found = _TERM.match(text)
+    if found is None:
+        raise ConditionError(
+            f"{text.strip()!r} is no condition: expected for example 'alpha.settled' or "
+            f"'distance_mm(alpha,beta) < 400'; numbers: {', '.join(MEASURES)}; flags: {', '.join(FLAGS)}"
+        )
+    name, flag, measure, listed, sign, number = found.groups()
+    if name is not None:
+        if flag not in FLAGS:
+            raise ConditionError(f"{flag!r} is no flag of a vehicle: there are {', '.join(FLAGS)}")
+        return [Term((vehicle,), flag=flag) for vehicle in _vehicles(name, groups)]
+    return [_number(measure, [word.strip() for word in listed.split(",")], sign, number, groups, bounds)]
+
+
+def _number(
+    measure: str,
+    names: list[str],
+    sign: str,
+    number: str,
+    groups: Mapping[str, tuple[str, ...]],
+    bounds: Bounds,
+) -> Term:
+    if measure not in MEASURES:
+        raise ConditionError(f"{measure!r} is no number to wait for: there are {', '.join(MEASURES)}")
+    row = MEASURES[measure]
+    vehicles = tuple(vehicle for name in names for vehicle in _vehicles(name, groups))
+    if len(vehicles) != row.takes or len(set(vehicles)) != row.takes:
+        wanted = "two different vehicles" if row.takes == 2 else "one vehicle"
+        raise ConditionError(f"{measure} takes {wanted}, found ({', '.join(names)})")
+    try:
+        bound = float(number)
+    except ValueError:
+        bound = math.nan
+    if not math.isfinite(bound):
+        raise ConditionError(f"{number!r} is no number that {measure} could be compared with")
+    is_below = sign.startswith("<")
+    low, high = row.low, row.high(bounds)
+    if (is_below and bound <= low) or (not is_below and bound >= high):
+        raise ConditionError(
+            f"{measure}({', '.join(vehicles)}) {sign} {bound:g} can never come true on this table: "
+            f"it lies between {low:g} and {high:g}"
+        )
+    return Term(vehicles, measure=measure, is_below=is_below, bound=bound)
+
+
+def _vehicles(name: str, groups: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    if name not in groups:
+        raise ConditionError(f"{name!r} is no vehicle here: there are {', '.join(groups)}")
+    if not groups[name]:
+        raise ConditionError(f"{name!r} are none here: no vehicle follows another")
+    return groups[name]

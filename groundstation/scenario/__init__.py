@@ -1,0 +1,1 @@
+"""Experiments as files: who flies, what happens when, what counts as success."""
