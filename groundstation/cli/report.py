@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.errors import RecordingError
 from groundstation.watch.report import write_report
+from groundstation.watch.verdict import Verdict
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -27,7 +28,9 @@ def report(
     print_report(recording, out)
 
 
-def print_report(recording: Path, out: Path) -> None:
+def print_report(
+    recording: Path, out: Path, *, verdict: Verdict | None = None, compare: Path | None = None
+) -> None:
     """Write the report and name its files.
 
     Raises:
@@ -38,7 +41,11 @@ def print_report(recording: Path, out: Path) -> None:
         task = bar.add_task("", total=1.0)
         try:
             written = write_report(
-                recording, out, lambda text, done: bar.update(task, description=text, completed=done)
+                recording,
+                out,
+                lambda text, done: bar.update(task, description=text, completed=done),
+                verdict=verdict,
+                compare=compare,
             )
         except RecordingError as error:
             raise UsageError(str(error)) from error

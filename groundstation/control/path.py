@@ -5,6 +5,7 @@ gas than one that is stopped at. It starts from where the mock-up is, so that th
 first waypoint, and starts again from there if the mock-up falls far behind.
 """
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Literal
@@ -50,7 +51,7 @@ class PathConfig(BaseModel):
     @field_validator("waypoints_m")
     @classmethod
     def _apart(cls, waypoints_m: tuple[Vector2, ...]) -> tuple[Vector2, ...]:
-        for number, (here, there) in enumerate(zip(waypoints_m, waypoints_m[1:], strict=False)):
+        for number, (here, there) in enumerate(itertools.pairwise(waypoints_m)):
             if not math.dist(here, there) > 0.0:  # NaN, too
                 raise ValueError(f"waypoints {number} and {number + 1} are the same place {there}")
         return waypoints_m
@@ -67,8 +68,8 @@ class Path:
         for number, (x, y) in enumerate(config.waypoints_m):
             if keep_in is not None and min(keep_in.edge_distances_m((x, y))) < 0.0:
                 raise ValueError(
-                    f"waypoints_m.{number}: ({x:g}, {y:g}) m lies outside the part of the table that vehicles "
-                    "keep to"
+                    f"waypoints_m.{number}: ({x:g}, {y:g}) m lies outside the part of the table that "
+                    "vehicles keep to"
                 )
         self._config = config
         self._station = StationKeeping(config.station, vehicle)

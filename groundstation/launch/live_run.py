@@ -2,8 +2,9 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Envelope
@@ -37,15 +38,25 @@ class LiveRun:
         rig_text: What its file reported when the rig was read.
         rig_path: The file.
         recording: Where the recorder writes.
+        watchers: By noun: take the messages of a topic besides, encoded.
     """
 
-    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        rig_text: str,
+        rig_path: Path,
+        recording: Path,
+        watchers: Mapping[str, Callable[[Recorded], None]] = MappingProxyType({}),
+    ) -> None:
         self.rig = rig
         self.recording = recording
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
         self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
+        self._watchers = watchers
+        self._nouns = frozenset(watchers) | frozenset(self.monitor.nouns)
         self._batches: Mailbox | None = None
         self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
@@ -109,7 +120,7 @@ class LiveRun:
                 continue
             self.launcher.received(process)
             try:
-                entries = read_batch(batch, self.monitor.nouns)
+                entries = read_batch(batch, self._nouns)
             except BatchError as error:
                 self.monitor.note(f"{process}: {error}")
                 continue
@@ -117,6 +128,9 @@ class LiveRun:
                 if not self._is_repeated(entry):
                     self.monitor.take(entry, now_ns)
                     self.faults.take(entry)
+                    watch = self._watchers.get(entry.noun)
+                    if watch is not None:
+                        watch(entry)
 
     def _is_repeated(self, entry: Recorded) -> bool:
         """Whether it is a latched message that came before: publishers repeat them for late joiners."""

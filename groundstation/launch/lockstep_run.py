@@ -1,6 +1,6 @@
 """A whole lockstep run of a rig into a recording, in virtual time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,12 +13,14 @@ from groundstation.parts.operation.messages import Latency
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import Recorder
 from groundstation.rig.provenance import recording_info
+from groundstation.runners.lockstep import LockstepRunner, Observer
 from groundstation.runners.make_runner import make_runner, seed_of
 from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.ledger import Ledger
 
 Progress = Callable[[str, float], None]
 LATENCY_PERIOD_NS = 1_000_000_000
+STEP_NS = 250_000_000
 
 
 class _LatencyReporter:
@@ -51,8 +53,22 @@ def run_lockstep(
     duration_s: float,
     seed: int | None,
     progress: Progress,
+    *,
+    observers: Iterable[Observer] = (),
+    is_over: Callable[[], bool] | None = None,
 ) -> FaultSummary:
     """Run a rig for ``duration_s`` of virtual time into a recording; return what went wrong.
+
+    Args:
+        rig: The rig.
+        rig_text: Text of its file, as the recording keeps it.
+        rig_path: The file.
+        recording: Where to write.
+        duration_s: At most so long.
+        seed: Of the laboratory; None takes the rig's.
+        progress: Called now and then.
+        observers: See every message besides.
+        is_over: Asked after each quarter of a second: True ends the run early.
 
     Raises:
         UsageError: The rig cannot run in lockstep, or the recording cannot be begun.
@@ -70,7 +86,7 @@ def run_lockstep(
         raise UsageError(str(error)) from error
     try:
         reporter = _LatencyReporter(tuple(rig.vehicles), recorder)
-        runner = make_runner(rig, seed, [recorder.record, reporter, faults.take_delivered])
+        runner = make_runner(rig, seed, [recorder.record, reporter, faults.take_delivered, *observers])
     except BaseException as error:
         recorder.discard()
         if isinstance(error, RigError):
@@ -79,10 +95,7 @@ def run_lockstep(
     try:
         with in_a_sentence(recorder):
             try:
-                runner.run(
-                    round(duration_s * 1e9),
-                    lambda now_ns: progress(f"{now_ns * 1e-9:.1f} s of {duration_s:g} s", now_ns * 1e-9),
-                )
+                run_until(runner, round(duration_s * 1e9), progress, is_over)
             finally:
                 runner.close()
             recorder.finish()
@@ -90,6 +103,23 @@ def run_lockstep(
         _end(recorder)
         raise
     return faults
+
+
+def run_until(
+    runner: LockstepRunner, until_ns: int, progress: Progress, is_over: Callable[[], bool] | None
+) -> None:
+    """Run to a moment of virtual time; in steps, where it may be over before."""
+    seconds = until_ns * 1e-9
+
+    def report(now_ns: int) -> None:
+        progress(f"{now_ns * 1e-9:.1f} s of {seconds:g} s", now_ns * 1e-9)
+
+    if is_over is None:
+        runner.run(until_ns, report)
+        return
+    while runner.now_ns < until_ns and not is_over():
+        runner.run(min(STEP_NS, until_ns - runner.now_ns))
+        report(runner.now_ns)
 
 
 def _end(recorder: Recorder) -> None:

@@ -50,7 +50,8 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.valves.part import PART as VALVES
 
     return (
-        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, SCENARIO, LABORATORY, REFERENCE,
+        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, SCENARIO, LABORATORY,
+        REFERENCE,
     )  # fmt: skip
 
 

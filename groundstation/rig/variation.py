@@ -8,6 +8,9 @@ from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import Rig
 from groundstation.rig.read import build_rig, bytes_of, source_of
 
+OPTIONAL_FROM = 2
+"""Tables nearer to the top have names that the rig chose."""
+
 
 def varied(rig: Rig, changes: Mapping[str, object]) -> Rig:
     """The rig with other values; the files that it names are not read again unless a change names another.
@@ -31,9 +34,12 @@ def _set(content: dict[str, Any], key: str, value: object) -> None:
     *way, last = key.split(".")
     found: object = content
     for place, name in enumerate(way):
-        found = _step(found, name)
-        if found is None:
+        inside = _step(found, name)
+        if inside is None and place >= OPTIONAL_FROM and isinstance(found, dict) and name not in found:
+            inside = found[name] = {}  # the file leaves it out; no key of it is refused later
+        if inside is None:
             raise RigError(f"{'.'.join(way[: place + 1])}: the rig has no such table")
+        found = inside
     if not isinstance(found, dict):
         raise RigError(f"{'.'.join(way)}: is no table of the rig")
     found[last] = value
@@ -50,3 +56,18 @@ def _step(table: object, name: str) -> object:
                 if isinstance(entry, dict) and entry.get("name") == name:
                     return entry
     return None
+
+
+def value_at(rig: Rig, key: str) -> object:
+    """The value that a key has in the file of a rig; None where the file leaves it out.
+
+    Raises:
+        RigError: A table on the way is not there.
+    """
+    found: object = source_of(rig).content
+    *way, last = key.split(".")
+    for place, name in enumerate(way):
+        found = _step(found, name)
+        if found is None and place < OPTIONAL_FROM:
+            raise RigError(f"{'.'.join(way[: place + 1])}: the rig has no such table")
+    return found.get(last) if isinstance(found, dict) else None

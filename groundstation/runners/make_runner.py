@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pydantic import ValidationError
 
 from drivers.errors import NotFound
-from drivers.laboratory import load_laboratory
+from drivers.laboratory import Laboratory, load_laboratory
 from groundstation.bus.journal import JournalWriter, NoJournal
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.node import Node
@@ -42,15 +42,11 @@ def make_runner(
     Raises:
         RigError: The rig has no laboratory, its laboratory refuses its table, or a node its configuration.
     """
-    if rig.laboratory is None:
-        raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
     journal, sequences = JournalWriter() if journaled else NoJournal(), Sequences()
+    laboratory = open_laboratory(rig, seed)
     try:
-        laboratory = load_laboratory(rig.laboratory.name, rig.laboratory.table, seed_of(rig, seed))
         slots = build_slots(rig, None, journal, sequences, name=PROCESS, measure=False)
-    except ValidationError as error:
-        raise RigError(_sentence(error)) from error
-    except (NotFound, ValueError) as error:  # a file of the laboratory, or of our calibration
+    except ValueError as error:  # a file of our calibration
         raise RigError(str(error)) from error
     extra = list(extra_nodes)
     asked = list(requests)
@@ -61,6 +57,22 @@ def make_runner(
         slots.append(Slot(key, node, PROCESS, journal, sequences, measure=False))
     ports = laboratory_ports(rig, laboratory.channels())
     return LockstepRunner(slots, laboratory, ports, observers, journal, sequences)
+
+
+def open_laboratory(rig: Rig, seed: int | None) -> Laboratory:
+    """The laboratory of a rig, in virtual time.
+
+    Raises:
+        RigError: The rig has none, or it refuses its table.
+    """
+    if rig.laboratory is None:
+        raise RigError("lockstep needs a [laboratory]: real hardware runs in real time")
+    try:
+        return load_laboratory(rig.laboratory.name, rig.laboratory.table, seed_of(rig, seed))
+    except ValidationError as error:
+        raise RigError(_sentence(error)) from error
+    except (NotFound, ValueError) as error:  # or a file of the laboratory
+        raise RigError(str(error)) from error
 
 
 def seed_of(rig: Rig, seed: int | None) -> int:

@@ -1,4 +1,4 @@
-"""From a scenario file to the rig that flies it: starts, controllers, and the timeline as its player reads it.
+"""From a scenario file to the rig that flies it: starts, controllers, the timeline as its player reads it.
 
 Everything that can be known before anything moves is checked here; each mistake is one sentence with file,
 key and what was expected.
@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from groundstation.control.controllers import controllers
-from groundstation.declarations.errors import RigError
 from groundstation.declarations.request import Action, ArgumentError
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, HoldSection, Rig
 from groundstation.parts.control.actions import GO_TO
@@ -26,7 +25,7 @@ from groundstation.parts.scenario.conditions import (
     read_condition,
 )
 from groundstation.parts.scenario.part import bounds_of
-from groundstation.parts.supervision.sections import starts_by_itself
+from groundstation.parts.supervision.sections import SupervisionOfVehicle
 from groundstation.rig.variation import varied
 from groundstation.scenario.scenario_file import ALL, FOLLOWERS, Limit, Obstacle, Row, ScenarioFile
 from groundstation.supervision.apart import too_near
@@ -35,7 +34,7 @@ Changes = dict[str, Any]
 Groups = Mapping[str, tuple[str, ...]]
 
 
-class KeyTrouble(ValueError):
+class KeyTroubleError(ValueError):
     """What is wrong with a scenario; the text begins with the key."""
 
 
@@ -48,18 +47,19 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
         is_hardware: Starts are gone to before t = 0; the laboratory's keys are left out.
 
     Raises:
-        KeyTrouble: The scenario does not fit the rig.
+        KeyTroubleError: The scenario does not fit the rig.
         RigError: The rig refuses what the scenario changes.
     """
     for name in file.vehicles:
         if name not in rig.vehicles:
-            raise KeyTrouble(f"vehicles.{name}: the rig has no such vehicle (it has: {_listed(rig)})")
+            raise KeyTroubleError(f"vehicles.{name}: the rig has no such vehicle (it has: {_listed(rig)})")
+    _check_starts(file, rig)
     changed = varied(rig, _changes(file, rig, is_hardware=is_hardware))
     _check_places(file, changed)
     groups = groups_of(changed)
-    starters = tuple(name for name in changed.vehicles if starts_by_itself(changed, name))
+    starters = tuple(name for name in changed.vehicles if _starts_by_itself(changed, name))
     if not starters:
-        raise KeyTrouble("rig: none of its vehicles starts by itself, so t = 0 would never come")
+        raise KeyTroubleError("rig: none of its vehicles starts by itself, so t = 0 would never come")
     section: Changes = {
         "name": file.name,
         "ready_s": file.ready_s,
@@ -83,7 +83,7 @@ def expanded(limit: Limit, number: int, groups: Groups) -> list[tuple[str, ...]]
     """Vehicles, or pairs of them, that a limit holds for.
 
     Raises:
-        KeyTrouble: It names a vehicle that is not there.
+        KeyTroubleError: It names a vehicle that is not there.
     """
     key = f"limits.{number}"
     if limit.vehicles is not None:
@@ -119,6 +119,10 @@ def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
     return changes
 
 
+def _starts_by_itself(rig: Rig, vehicle: str) -> bool:
+    return rig.vehicle(vehicle, SupervisionOfVehicle).starts_by_itself
+
+
 def _has_program(rig: Rig, vehicle: str) -> bool:
     return controllers()[control_of(rig, vehicle)[0].controller].has_program
 
@@ -133,35 +137,33 @@ def _check_places(file: ScenarioFile, rig: Rig) -> None:
         if not (
             table.x_min_m <= obstacle.x_m <= table.x_max_m and table.y_min_m <= obstacle.y_m <= table.y_max_m
         ):
-            raise KeyTrouble(f"obstacles.{number}: ({obstacle.x_m:g}, {obstacle.y_m:g}) m is not on the table")
-    starts = {name: (start_key(file, name), rig.vehicles[name].hold) for name in rig.vehicles}
+            raise KeyTroubleError(
+                f"obstacles.{number}: ({obstacle.x_m:g}, {obstacle.y_m:g}) m is off the table"
+            )
+    starts = {name: (_start_key(file, name), rig.vehicles[name].hold) for name in rig.vehicles}
     for key, hold in starts.values():
         refusal = _off_place(hold.x_m, hold.y_m, rig, file.obstacles)
         if refusal:
-            raise KeyTrouble(f"{key}: {refusal}")
+            raise KeyTroubleError(f"{key}: {refusal}")
     for (name, (_, hold)), (_, (key, its)) in itertools.combinations(starts.items(), 2):
         apart_m = math.dist((hold.x_m, hold.y_m), (its.x_m, its.y_m))
         refusal = too_near(f"the start of {name}", apart_m, relation="from there")
         if refusal:
-            raise KeyTrouble(f"{key}: {refusal}")
+            raise KeyTroubleError(f"{key}: {refusal}")
 
 
-def start_key(file: ScenarioFile, vehicle: str) -> str:
+def _start_key(file: ScenarioFile, vehicle: str) -> str:
     """The key of a vehicle's start: the scenario's, or the rig's pose to hold."""
     keys = file.vehicles.get(vehicle)
     return f"vehicles.{vehicle}.{'hold' if keys is None or keys.start is None else 'start'}"
 
 
-def check_starts(file: ScenarioFile, rig: Rig) -> None:
-    """Starts of the scenario are on the table: before the rig says so of the pose to hold.
-
-    Raises:
-        KeyTrouble: One is not.
-    """
+def _check_starts(file: ScenarioFile, rig: Rig) -> None:
+    """Starts of the scenario are on the table, in its own words before the rig's."""
     for name, keys in file.vehicles.items():
         start: HoldSection | None = keys.start
         if start is not None and not rig.table.holds(start.x_m, start.y_m):
-            raise KeyTrouble(f"vehicles.{name}.start: {_off_table(start.x_m, start.y_m)}")
+            raise KeyTroubleError(f"vehicles.{name}.start: {_off_table(start.x_m, start.y_m)}")
 
 
 def _off_table(x_m: float, y_m: float) -> str:
@@ -197,7 +199,7 @@ def _rows(file: ScenarioFile, rig: Rig, groups: Groups) -> Iterator[Changes]:
             condition = _condition(row, key, rig, groups)
             earliest_s += row.after_s + (SETTLED_FOR_NS * 1e-9 if _needs_settling(condition) else 0.0)
             if earliest_s > file.duration_s:
-                raise KeyTrouble(
+                raise KeyTroubleError(
                     f"{key}.when: {row.when!r} cannot come true before the end: not before {earliest_s:g} s, "
                     f"duration_s = {file.duration_s:g}"
                 )
@@ -219,9 +221,9 @@ def _condition(row: Row, key: str, rig: Rig, groups: Groups) -> Condition:
     try:
         condition = read_condition(row.when, groups, bounds_of(rig))
     except ConditionError as error:
-        raise KeyTrouble(f"{key}.when: {error}") from error
+        raise KeyTroubleError(f"{key}.when: {error}") from error
     if _needs_settling(condition) and row.timeout_s <= SETTLED_FOR_NS * 1e-9:
-        raise KeyTrouble(
+        raise KeyTroubleError(
             f"{key}.timeout_s: {row.timeout_s:g} s is too short, a vehicle has settled after "
             f"{SETTLED_FOR_NS * 1e-9:g} s at the earliest"
         )
@@ -239,18 +241,18 @@ def _asked(row: Row, key: str, rig: Rig, file: ScenarioFile) -> tuple[str, dict[
         try:
             given = INJECT.check({"failure": row.failure, "for_s": row.for_s, "parameters": parameters})
         except ArgumentError as error:
-            raise KeyTrouble(f"{key}: {error}") from error
+            raise KeyTroubleError(f"{key}: {error}") from error
         return INJECT.name, dict(given)
     assert row.request is not None
     actions = rig.tables.actions
     if row.request not in actions or row.request == INJECT.name:
         known = ", ".join(sorted(set(actions) - {INJECT.name}))
-        raise KeyTrouble(f"{key}.request: {row.request!r} is no action (there are: {known})")
+        raise KeyTroubleError(f"{key}.request: {row.request!r} is no action (there are: {known})")
     given = _arguments(actions[row.request], row, key)
     if row.request == GO_TO.name and row.answer == "accepted":
         refusal = _off_place(float(given["x_m"]), float(given["y_m"]), rig, file.obstacles)
         if refusal:
-            raise KeyTrouble(f"{key}.arguments: {refusal}")
+            raise KeyTroubleError(f"{key}.arguments: {refusal}")
     return row.request, given
 
 
@@ -270,19 +272,16 @@ def _arguments(action: Action, row: Row, key: str) -> dict[str, Any]:
     try:
         return dict(action.check(given))
     except ArgumentError as error:
-        raise KeyTrouble(f"{key}.arguments: {str(error).replace('_rad', '_deg')}") from error
+        raise KeyTroubleError(f"{key}.arguments: {str(error).replace('_rad', '_deg')}") from error
 
 
 def _members(key: str, word: str, groups: Groups) -> tuple[str, ...]:
     if word not in groups:
-        raise KeyTrouble(f"{key}: {word!r} is no vehicle of the rig (there are: {', '.join(groups)})")
+        raise KeyTroubleError(f"{key}: {word!r} is no vehicle of the rig (there are: {', '.join(groups)})")
     if not groups[word]:
-        raise KeyTrouble(f"{key}: {word!r} are none here, no vehicle follows another")
+        raise KeyTroubleError(f"{key}: {word!r} are none here, no vehicle follows another")
     return groups[word]
 
 
 def _listed(rig: Rig) -> str:
     return ", ".join(rig.vehicles)
-
-
-__all__ = ["KeyTrouble", "RigError", "check_starts", "compiled_rig", "expanded", "groups_of"]

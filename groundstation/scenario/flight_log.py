@@ -1,7 +1,6 @@
 """What a run's quantities are made from: rows of numbers for each vehicle, gathered as messages come."""
 
 import json
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -97,8 +96,8 @@ class FlightLog:
                 pose = (*message.position_table_m, message.heading_rad, *message.velocity_table_m_s)
                 rows.state.append((message.stamp_ns, *pose))
             case ControlStatus():
-                pose = (*message.goal_position_table_m, message.goal_heading_rad)
-                rows.setpoint.append((message.stamp_ns, *pose))
+                goal = (*message.goal_position_table_m, message.goal_heading_rad)
+                rows.setpoint.append((message.stamp_ns, *goal))
             case ValveCommand():
                 if any(message.on_time_ms):
                     open_ms = sum(min(on_ms, COMMAND_MS) for on_ms in message.on_time_ms)
@@ -106,9 +105,7 @@ class FlightLog:
             case Supervision():
                 if message.mode != rows.mode:
                     rows.mode = message.mode
-                    self._events.append(
-                        (now_ns, "mode", message.vehicle, f"{message.mode}: {message.cause}")
-                    )
+                    self._events.append((now_ns, "mode", message.vehicle, f"{message.mode}: {message.cause}"))
             case Faults():
                 self._faults(rows, message, now_ns)
             case InjectedFailure() if not message.refusal:
@@ -204,5 +201,3 @@ def within(rows: Array, from_s: float, to_s: float) -> Array:
     """Rows of a span; both ends belong to it."""
     found: Array = rows[(rows[:, 0] >= from_s) & (rows[:, 0] <= to_s)]
     return found
-
-

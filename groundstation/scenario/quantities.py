@@ -173,8 +173,8 @@ def _overshoot_mm(flown: Flown, vehicles: tuple[str, ...], span: Span) -> Value:
     track = flown.tracks[vehicles[0]]
     goals = within(track.goals, span.from_s, span.to_s)
     found = [UNKNOWN]
-    ends_s = [*goals[1:, 0], span.to_s]
-    for goal, end_s in zip(goals, ends_s, strict=True):
+    for number, goal in enumerate(goals):
+        end_s = float(goals[number + 1, 0]) if number + 1 < len(goals) else span.to_s
         truth = within(track.truth, float(goal[0]), end_s)
         if not len(truth):
             continue

@@ -8,7 +8,7 @@ when it comes; of the rest the newest bytes are kept until somebody looks.
 """
 
 from collections import deque
-from collections.abc import Container, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from groundstation.bus.cdr import CodecError, codec_of
@@ -83,7 +83,7 @@ class Monitor:
         }
 
     @property
-    def nouns(self) -> Container[str]:
+    def nouns(self) -> Collection[str]:
         """Of the topics whose messages change anything here; all others need not be given."""
         return self._routes.keys()
 

@@ -12,11 +12,19 @@ from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
 from groundstation.watch.summary import summarise, wanted
+from groundstation.watch.verdict import Verdict
 
 Progress = Callable[[str, float], None]
 
 
-def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path]:
+def write_report(
+    recording: Path,
+    folder: Path,
+    progress: Progress,
+    *,
+    verdict: Verdict | None = None,
+    compare: Path | None = None,
+) -> list[Path]:
     """Read a recording and write figures and ``report.json`` into a folder.
 
     Raises:
@@ -32,6 +40,7 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
     if not reports:
         raise UsageError(f"{recording}: holds no vehicle state, so there is nothing to report")
     folder.parent.mkdir(parents=True, exist_ok=True)
+    del compare
     tracks = {name: report.track for name, report in reports.items()}
     figures = {
         "table.png": draw_table,
@@ -45,6 +54,8 @@ def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path
         "duration_s": duration_s,
         "vehicles": {name: report.numbers for name, report in reports.items()},
     }
+    if verdict is not None:
+        summary |= {"verdict": verdict.verdict, "reason": verdict.reason}
     with whole_folder(folder) as made:
         for done, (name, draw) in enumerate(figures.items(), start=1):
             progress(f"drawing {name}", done / (len(figures) + 1))

@@ -1,7 +1,7 @@
 """Conditions that a timeline waits for: what can be asked, how it is written, when it holds. Pure.
 
-``alpha.settled``, ``alpha.landed``, ``distance_mm(alpha,beta) < 400``; several are joined by ``and``. They are
-judged by what the station believes (the estimate), as an operator would; limits are judged by truth.
+``alpha.settled``, ``alpha.landed``, ``distance_mm(alpha,beta) < 400``; several are joined by ``and``. They
+are judged by what the station believes (the estimate), as an operator would; limits are judged by truth.
 """
 
 import math
@@ -76,9 +76,7 @@ class Known:
 
     def is_settled(self, since_ns: int, now_ns: int) -> bool:
         """Whether it has been settled for long enough, not counting what was before a moment."""
-        return (
-            self.near_since_ns is not None and now_ns - max(self.near_since_ns, since_ns) >= SETTLED_FOR_NS
-        )
+        return self.near_since_ns is not None and now_ns - max(self.near_since_ns, since_ns) >= SETTLED_FOR_NS
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +122,7 @@ class Measure:
 
 
 MEASURES: Mapping[str, Measure] = {
-    "distance_mm": Measure(
-        "between two hulls", 2, _distance_mm, lambda bounds: 1e3 * bounds.diagonal_m
-    ),
+    "distance_mm": Measure("between two hulls", 2, _distance_mm, lambda bounds: 1e3 * bounds.diagonal_m),
     "edge_mm": Measure(
         "from the hull to the table's edge",
         1,

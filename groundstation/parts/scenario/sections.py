@@ -6,6 +6,7 @@ stand in the rig so that a recording holds all that is needed to replay the run.
 
 from pydantic import Field
 
+from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import NonNegative, Positive, Section
 
 
@@ -60,6 +61,12 @@ class ScenarioSection(Section):
 
 
 class ScenarioOfRig(Section):
-    """Keys of the rig."""
+    """Keys of the rig.
+
+    Attributes:
+        scenario: The timeline, where a scenario is flown.
+        twin: Rig file of the emulated twin of real hardware: scenarios fly there first.
+    """
 
     scenario: ScenarioSection | None = Field(default=None)
+    twin: RigFile | None = None

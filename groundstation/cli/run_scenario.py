@@ -1,0 +1,173 @@
+"""A scenario as ``groundstation run`` flies it: live, in lockstep, on hardware; then the verdict."""
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.bus.cdr import CodecError, codec_of
+from groundstation.bus.record_stream import Recorded
+from groundstation.cli.live_view import run_live
+from groundstation.cli.run_progress import RunProgress
+from groundstation.cli.runs_files import finished_files
+from groundstation.declarations.errors import GroundStationError, NodeError, UsageError
+from groundstation.files.writing import check_folder
+from groundstation.launch.live_run import LiveRun
+from groundstation.parts.scenario.messages import FAILED, RUNNING, WAITING, Marker, ScenarioStatus
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.writer import check_new_recording
+from groundstation.rig.read import load_rig, source_of
+from groundstation.scenario.judging import Judged, sentence
+from groundstation.scenario.loading import Scenario, load, rig_text
+from groundstation.scenario.rehearsal import check_failures, rehearse
+from groundstation.scenario.running import fly_recorded, judge_recordings, longest_s, seed_for
+from groundstation.watch.verdict import PASSED
+
+HELD, BROKEN, WRONG = 0, 1, 3
+"""Exit codes: all limits held; one failed, or a vehicle ended otherwise than it should; error."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What the command line asks for."""
+
+    file: Path
+    lockstep: bool
+    headless: bool
+    seed: int | None
+    record: Path | None
+    report: Path | None
+    compare: Path | None
+    hardware: Path | None
+    i_know: str | None
+
+
+def run_scenario(flight: Flight) -> int:
+    """Fly a scenario; return the exit code.
+
+    Raises:
+        UsageError: The file, or what was asked for, is wrong.
+    """
+    if flight.lockstep and flight.hardware is not None:
+        raise UsageError("--hardware runs in real time, --lockstep in virtual time: give one of them")
+    if flight.i_know is not None and not flight.i_know.strip():
+        raise UsageError("--i-know needs a reason in words: it is recorded")
+    if flight.record is not None:
+        check_new_recording(flight.record)
+    if flight.report is not None:
+        check_folder(flight.report)
+    scenario = load(flight.file)
+    seed = seed_for(scenario, flight.seed)
+    if flight.hardware is not None:
+        scenario = _on_hardware(scenario, flight, flight.hardware)
+    else:
+        check_failures(scenario)
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
+    recording = flight.record or scenario.rig.record.directory / f"{stamp}.mcap"
+    try:
+        judged = _flown(scenario, flight, seed, recording)
+    except UsageError:
+        raise
+    except (GroundStationError, NodeError, RecordingError) as error:
+        sys.stderr.write(f"groundstation: {error}\n")
+        return WRONG
+    _print_verdict(judged)
+    return HELD if judged.verdict.verdict == PASSED else BROKEN
+
+
+def _on_hardware(scenario: Scenario, flight: Flight, path: Path) -> Scenario:
+    """The scenario on the hardware, once its twin has flown it."""
+    hardware = load_rig(path)
+    on_hardware = scenario.on_hardware(hardware)
+    with RunProgress(longest_s(scenario)) as progress:
+        refusal = rehearse(scenario, hardware, flight.seed, progress)
+    if not refusal:
+        print("dry run on the twin: passed")
+        return on_hardware
+    if flight.i_know is None:
+        raise UsageError(f"{refusal}; --i-know REASON flies all the same, and is recorded")
+    print(f"dry run on the twin: {refusal}; flown all the same: {flight.i_know}")
+    return on_hardware.remarked(f"flown although {refusal}: {flight.i_know}")
+
+
+def _flown(scenario: Scenario, flight: Flight, seed: int, recording: Path) -> Judged:
+    trouble = ""
+    try:
+        if flight.lockstep:
+            with RunProgress(longest_s(scenario)) as progress:
+                judged, faults = fly_recorded(scenario, seed, recording, progress)
+        else:
+            if scenario.rig.laboratory is not None:
+                scenario = scenario.vary({"laboratory.seed": seed})
+            judged, faults, trouble = None, None, _fly_live(scenario, flight, recording)
+    finally:
+        finished, _ = finished_files(recording)
+    if judged is None:
+        judged = judge_recordings(scenario, finished)
+    for line in faults.lines() if faults is not None else ():
+        print(line)
+    if trouble:
+        raise GroundStationError(trouble)
+    if flight.report is not None and finished:
+        from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
+
+        print_report(finished[-1], flight.report, verdict=judged.verdict, compare=flight.compare)
+    return judged
+
+
+class _Watch:
+    """Follows how far a live scenario has come."""
+
+    def __init__(self) -> None:
+        self.live: LiveRun | None = None
+        self.is_over = False
+        self._last = ("", 0)
+
+    def status(self, recorded: Recorded) -> None:
+        """Take a status of the player."""
+        try:
+            status = codec_of(ScenarioStatus).decode(recorded.data)
+        except CodecError:
+            return  # garbled: the next one comes in a fifth of a second
+        self.is_over = status.state not in (WAITING, RUNNING)
+        now = status.state, status.fired
+        if now != self._last:
+            self._last = now
+            waits = f", waits for {status.waits_for}" if status.waits_for else ""
+            reason = f": {status.reason}" if status.state == FAILED else ""
+            self._note(f"scenario {status.state}, {status.fired} rows done{waits}{reason}")
+
+    def marker(self, recorded: Recorded) -> None:
+        """Take a marker."""
+        try:
+            self._note(f"marker: {codec_of(Marker).decode(recorded.data).text}")
+        except CodecError:
+            return  # it stands in the recording
+
+    def _note(self, text: str) -> None:
+        if self.live is not None:
+            self.live.monitor.note(text)
+
+
+def _fly_live(scenario: Scenario, flight: Flight, recording: Path) -> str:
+    """Fly in real time; what is wrong with the recording, empty if nothing is."""
+    watch = _Watch()
+    watch.live = LiveRun(
+        scenario.rig,
+        rig_text(scenario.rig),
+        source_of(scenario.rig).path,
+        recording,
+        {ScenarioStatus.TOPIC.noun: watch.status, Marker.TOPIC.noun: watch.marker},
+    )
+    headless = flight.headless or not sys.stdout.isatty()
+    run_live(watch.live, None, headless=headless, is_over=lambda: watch.is_over)
+    for line in watch.live.faults.lines():
+        print(line)
+    return watch.live.launcher.recording_trouble
+
+
+def _print_verdict(judged: Judged) -> None:
+    for outcome in judged.verdict.limits:
+        print(f"{'held  ' if outcome.held else 'FAILED'} {sentence(outcome)}")
+    reason = judged.verdict.reason
+    print(f"verdict: {judged.verdict.verdict}{f': {reason}' if reason else ''}")

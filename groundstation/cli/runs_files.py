@@ -1,0 +1,18 @@
+"""The recordings that a run has left."""
+
+from pathlib import Path
+
+from groundstation.recording.writer import PART_SUFFIX
+
+
+def finished_files(recording: Path) -> tuple[list[Path], list[Path]]:
+    """Name the files of a run; a recorder that was started again left several. Finished ones, and others."""
+    every = [recording, *sorted(recording.parent.glob(f"{recording.stem}_[0-9]*{recording.suffix}*"))]
+    torn = recording.with_name(recording.name + PART_SUFFIX)
+    finished = [path for path in every if path.suffix == recording.suffix and path.exists()]
+    for path in finished:
+        print(f"recording: {path}")
+    left = [path for path in [torn, *every] if path.name.endswith(PART_SUFFIX) and path.exists()]
+    for path in left:
+        print(f"not finished: {path} (groundstation recording recover brings back what it holds)")
+    return finished, left

@@ -1,0 +1,145 @@
+"""The verdict on a run: limits against what was flown, and whether everybody ended as it should."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from groundstation.control.follow import FollowConfig
+from groundstation.declarations.rig import Rig
+from groundstation.parts.control.sections import control_of
+from groundstation.parts.scenario.messages import ENDED
+from groundstation.parts.scenario.part import bounds_of
+from groundstation.scenario.compiling import expanded, groups_of
+from groundstation.scenario.flight_log import FlightLog
+from groundstation.scenario.loading import Scenario
+from groundstation.scenario.quantities import QUANTITIES, Flown, Keeps, Span, Value, every_quantity
+from groundstation.supervision.modes import Mode
+from groundstation.watch.verdict import FAILED, PASSED, LimitOutcome, Verdict
+
+UNEXPECTED = (Mode.LANDED, Mode.LANDING, Mode.STOPPED, Mode.LOST, Mode.RESTING)
+"""Modes in which a vehicle has not ended as it should, unless it may land."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A run that has been judged.
+
+    Attributes:
+        verdict: With its limits.
+        values: Every quantity over the whole run, by its column; empty where t = 0 never came.
+        flown: What they were made from; None where t = 0 never came.
+    """
+
+    verdict: Verdict
+    values: dict[str, Value]
+    flown: Flown | None
+
+
+def judge(scenario: Scenario, log: FlightLog, *, began_ns: int = 0) -> Judged:
+    """Judge a run.
+
+    Args:
+        scenario: That was flown.
+        log: Of the flight.
+        began_ns: Stamp at which the recording began.
+    """
+    zero_ns = log.zero_ns
+    if zero_ns is None:
+        reason = log.status.reason if log.status is not None else ""
+        limits = tuple(_not_reached(scenario))
+        words = reason or "the run ended before t = 0, when the last vehicle flies"
+        return Judged(Verdict(FAILED, words, limits, log.events(), math.nan), {}, None)
+    seen = flown(scenario, log)
+    outcomes = tuple(_outcomes(scenario, seen))
+    reason = _went_wrong(scenario, log) or _first_broken(outcomes)
+    verdict = Verdict(
+        FAILED if reason else PASSED, reason, outcomes, seen.events, (zero_ns - began_ns) * 1e-9
+    )
+    return Judged(verdict, dict(every_quantity(seen)), seen)
+
+
+def flown(scenario: Scenario, log: FlightLog) -> Flown:
+    """What the quantities of a run are made from."""
+    rig = scenario.rig
+    return Flown(
+        log.tracks(),
+        log.events(),
+        bounds_of(rig),
+        tuple((each.x_m, each.y_m, each.radius_m) for each in scenario.file.obstacles),
+        {name: rig.type_of(name).valves.thrust_n for name in rig.vehicles},
+        dict(_keeps(rig)),
+        min(scenario.file.duration_s, (log.last_ns - (log.zero_ns or 0)) * 1e-9),
+    )
+
+
+def _keeps(rig: Rig) -> Iterator[tuple[str, Keeps]]:
+    for name in rig.vehicles:
+        section = control_of(rig, name)[0]
+        if section.controller == "follow":
+            config = FollowConfig.model_validate(section.parameters)
+            yield name, Keeps(config.leader, config.distance_m, config.face)
+
+
+def _outcomes(scenario: Scenario, seen: Flown) -> Iterator[LimitOutcome]:
+    groups = groups_of(scenario.rig)
+    for number, limit in enumerate(scenario.file.limits):
+        row = QUANTITIES[limit.what]
+        span = Span(limit.from_s, scenario.file.duration_s if limit.to_s is None else limit.to_s)
+        for vehicles in expanded(limit, number, groups):
+            found = row.of(seen, vehicles, span)
+            held = (limit.below is None or found.value < limit.below) and (
+                limit.above is None or found.value > limit.above
+            )
+            yield LimitOutcome(
+                limit.what,
+                vehicles,
+                found.value,
+                limit.below,
+                limit.above,
+                held and not math.isnan(found.value),
+                found.at_s,
+            )
+
+
+def _not_reached(scenario: Scenario) -> Iterator[LimitOutcome]:
+    groups = groups_of(scenario.rig)
+    for number, limit in enumerate(scenario.file.limits):
+        for vehicles in expanded(limit, number, groups):
+            yield LimitOutcome(limit.what, vehicles, math.nan, limit.below, limit.above, False, math.nan)
+
+
+def _went_wrong(scenario: Scenario, log: FlightLog) -> str:
+    """Why the run failed whatever its limits; empty if it did not."""
+    if log.status is None or log.status.state != ENDED:
+        reason = log.status.reason if log.status is not None else ""
+        return reason or "the run ended before its scenario did"
+    for name, rows in log.vehicles.items():
+        keys = scenario.file.vehicles.get(name)
+        may_land = name not in scenario.section.starters or (keys is not None and keys.may_land)
+        if rows.mode in UNEXPECTED and not may_land:
+            events = [event for event in log.events() if event.vehicle == name and event.kind == "mode"]
+            at = f" since {events[-1].t_s:.1f} s ({events[-1].text.partition(': ')[2]})" if events else ""
+            return f"{name} ended {rows.mode}{at}: a scenario says may_land = true where that is right"
+    return ""
+
+
+def _first_broken(outcomes: tuple[LimitOutcome, ...]) -> str:
+    for outcome in outcomes:
+        if not outcome.held:
+            return sentence(outcome)
+    return ""
+
+
+def sentence(outcome: LimitOutcome) -> str:
+    """A limit and what became of it, in words."""
+    bounds = [
+        f"{word} {bound:g}"
+        for word, bound in (("below", outcome.below), ("above", outcome.above))
+        if bound is not None
+    ]
+    found = "unknown: nothing was recorded to make it from"
+    if math.isinf(outcome.value):
+        found = "never reached"
+    elif not math.isnan(outcome.value):
+        found = f"{outcome.value:.4g} at {outcome.at_s:.1f} s"
+    return f"{outcome.what} of {'-'.join(outcome.vehicles)} is {found}, limit {' and '.join(bounds)}"

@@ -1,0 +1,158 @@
+"""A scenario as it was read: its file, its rig, and the same with other values."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from groundstation.declarations.errors import RigError, UsageError
+from groundstation.declarations.rig import Rig
+from groundstation.files.reading import path_of
+from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
+from groundstation.rig.read import load_rig, source_of
+from groundstation.rig.variation import varied
+from groundstation.scenario.compiling import KeyTroubleError, compiled_rig
+from groundstation.scenario.scenario_file import ScenarioError, ScenarioFile, parse_content, read_content
+
+OF_VEHICLE = ("start", "control", "laboratory", "may_land")
+"""Keys of a vehicle that are the scenario's; all others are the rig's."""
+OF_SCENARIO = ("timeline", "obstacles", "duration_s", "ready_s")
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """An experiment.
+
+    Attributes:
+        path: Of its file.
+        content: Keys of the file, changed ones included.
+        file: The same, checked.
+        base: The rig that it names.
+        rig: The rig that flies it: starts, controllers and timeline inside.
+    """
+
+    path: Path
+    content: dict[str, Any]
+    file: ScenarioFile
+    base: Rig
+    rig: Rig
+
+    @property
+    def name(self) -> str:
+        """Of the scenario."""
+        return self.file.name
+
+    @property
+    def section(self) -> ScenarioSection:
+        """The timeline as its player reads it."""
+        found = self.rig.section(ScenarioOfRig).scenario
+        assert found is not None
+        return found
+
+    def vary(self, changes: Mapping[str, object]) -> "Scenario":
+        """The scenario with other values.
+
+        Args:
+            changes: By key: of the scenario (``vehicles.alpha.start.x_m``, ``timeline.0.at_s``), or of its
+                rig (``laboratory.alpha.mass_kg``, ``mock_ups.standard.mass_kg``).
+
+        Raises:
+            ScenarioError: A key leads nowhere, or its value is refused.
+        """
+        content = deepcopy(self.content)
+        for key, value in changes.items():
+            if is_of_scenario(key):
+                _set(content, key, value, self.path, self.base)
+            else:
+                content.setdefault("changes", {})[key] = value
+        return made(content, self.path, self.base)
+
+    def remarked(self, text: str) -> "Scenario":
+        """The scenario with a marker at t = 0."""
+        section = self.section.model_dump(exclude_none=True)
+        section["timeline"] = [{"where": "remark", "at_s": 0.0, "mark": text}, *section["timeline"]]
+        return replace(self, rig=varied(self.rig, {"scenario": section}))
+
+    def on_hardware(self, rig: Rig) -> "Scenario":
+        """The same scenario on another rig: starts are gone to before t = 0.
+
+        Raises:
+            ScenarioError: It injects failures, or does not fit the rig.
+        """
+        for number, row in enumerate(self.file.timeline):
+            if row.failure is not None:
+                raise ScenarioError(
+                    f"{self.path}: timeline.{number}.failure: hardware cannot be given {row.failure!r}"
+                )
+        return replace(self, base=rig, rig=_compiled(self.file, self.path, rig, is_hardware=True))
+
+
+def load(path: Path | str) -> Scenario:
+    """Read a scenario file and its rig, and check everything that can be known before anything moves.
+
+    Raises:
+        UsageError: One sentence with file and key.
+    """
+    path = Path(path)
+    return made(read_content(path), path)
+
+
+def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenario:
+    """Make a scenario of the keys of its file.
+
+    Args:
+        content: The keys.
+        path: Of the file: the path of the rig starts there.
+        base: The rig, where it was read before.
+
+    Raises:
+        UsageError: One sentence with file and key.
+    """
+    file = parse_content(content, path)
+    if base is None:
+        base = load_rig(path.parent / path_of(file.rig))
+    return Scenario(path, content, file, base, _compiled(file, path, base))
+
+
+def rig_text(rig: Rig) -> str:
+    """The text of a rig whose keys have been changed: what is recorded, and what processes read."""
+    return tomli_w.dumps(source_of(rig).content)
+
+
+def is_of_scenario(key: str) -> bool:
+    """Whether a key is one of the scenario file itself; all others are keys of its rig."""
+    names = key.split(".")
+    if names[0] == "vehicles":
+        return len(names) > 2 and names[2] in OF_VEHICLE
+    return names[0] in OF_SCENARIO
+
+
+def _compiled(file: ScenarioFile, path: Path, base: Rig, *, is_hardware: bool = False) -> Rig:
+    try:
+        return compiled_rig(file, base, is_hardware=is_hardware)
+    except KeyTroubleError as error:
+        raise ScenarioError(f"{path}: {error}") from error
+    except RigError as error:
+        prefix = f"{source_of(base).path}: "
+        raise ScenarioError(f"{path}: {str(error).removeprefix(prefix)}") from error
+
+
+def _set(content: dict[str, Any], key: str, value: object, path: Path, base: Rig) -> None:
+    *way, last = key.split(".")
+    found: Any = content
+    if way[0] == "vehicles" and way[2:] == ["start"] and way[1] in base.vehicles:
+        keys = content.setdefault("vehicles", {}).setdefault(way[1], {})
+        keys.setdefault("start", base.vehicles[way[1]].hold.model_dump())
+    for place, name in enumerate(way):
+        if isinstance(found, list):
+            found = found[int(name)] if name.isdigit() and int(name) < len(found) else None
+        elif isinstance(found, dict):
+            found = found.setdefault(name, {})
+        if not isinstance(found, dict | list):
+            raise UsageError(f"{path}: {'.'.join(way[: place + 1])}: the scenario has no such table")
+    if not isinstance(found, dict):
+        raise UsageError(f"{path}: {key}: the scenario has no such key")
+    found[last] = value
