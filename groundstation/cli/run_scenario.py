@@ -19,7 +19,7 @@ from groundstation.recording.writer import check_new_recording
 from groundstation.rig.read import load_rig, source_of
 from groundstation.scenario.judging import Judged, sentence
 from groundstation.scenario.loading import Scenario, load, rig_text
-from groundstation.scenario.rehearsal import check_failures, rehearse
+from groundstation.scenario.rehearsal import check_dispersions, check_failures, rehearse
 from groundstation.scenario.running import fly_recorded, judge_recordings, longest_s, seed_for
 from groundstation.watch.verdict import PASSED
 
@@ -62,6 +62,7 @@ def run_scenario(flight: Flight) -> int:
         scenario = _on_hardware(scenario, flight, flight.hardware)
     else:
         check_failures(scenario)
+        check_dispersions(scenario)
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
     recording = flight.record or scenario.rig.record.directory / f"{stamp}.mcap"
     try:

@@ -93,4 +93,6 @@ def seed_of(rig: Rig, seed: int | None) -> int:
 def _sentence(error: ValidationError) -> str:
     first = error.errors()[0]
     key = ".".join(str(part) for part in ("laboratory", *first["loc"]))
+    if first["type"] == "extra_forbidden":
+        return f"'{key}' is no known key (a typo?)"
     return f"{key}: {first['msg'].removeprefix('Value error, ')}"

@@ -1,6 +1,7 @@
 """What a run's quantities are made from: rows of numbers for each vehicle, gathered as messages come."""
 
 import json
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from groundstation.bus.envelope import Delivered
 from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.actions import GO_TO
+from groundstation.parts.control.controller_node import RESUME
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.laboratory.messages import InjectedFailure
@@ -38,7 +40,7 @@ class VehicleRows:
         state: The same by the estimate, while it is flown on.
         setpoint: Stamp, x, y, heading.
         open_valves: Stamp, valve seconds that the command opens.
-        goals: Stamp, x, y, heading of each accepted `go_to`.
+        goals: Stamp, x, y, heading of each accepted `go_to`; NaN from where a program goes on.
         mode: Of the supervisor, the newest.
         faults: What stands now.
     """
@@ -131,9 +133,13 @@ class FlightLog:
         request = self._asked.pop((ack.author, ack.request_id), None)
         words = "accepted" if ack.accepted else f"refused: {ack.reason}"
         self._events.append((now_ns, "request", ack.vehicle, f"{ack.action} {words}"))
-        if request is not None and ack.accepted and ack.action == GO_TO.name:
+        if request is None or not ack.accepted:
+            return
+        if ack.action == GO_TO.name:
             given = json.loads(request.arguments)
             rows.goals.append((now_ns, given["x_m"], given["y_m"], given["heading_rad"]))
+        elif ack.action == RESUME:
+            rows.goals.append((now_ns, math.nan, math.nan, math.nan))
 
     def events(self) -> tuple[RunEvent, ...]:
         """What happened, in order; times count from t = 0, or from the start where that never came."""

@@ -14,7 +14,7 @@ from groundstation.files.reading import path_of
 from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
 from groundstation.rig.read import load_rig, source_of
 from groundstation.rig.variation import varied
-from groundstation.scenario.compiling import KeyTroubleError, compiled_rig
+from groundstation.scenario.compiling import KeyTroubleError, compiled_rig, expanded, groups_of
 from groundstation.scenario.scenario_file import ScenarioError, ScenarioFile, parse_content, read_content
 
 OF_VEHICLE = ("start", "control", "laboratory", "may_land")
@@ -113,7 +113,10 @@ def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenar
     """
     file = parse_content(content, path)
     if base is None:
-        base = load_rig(path.parent / path_of(file.rig))
+        try:
+            base = load_rig(path.parent / path_of(file.rig))
+        except UsageError as error:
+            raise ScenarioError(f"{path}: rig: {error}") from error
     return Scenario(path, content, file, base, _compiled(file, path, base))
 
 
@@ -132,7 +135,11 @@ def is_of_scenario(key: str) -> bool:
 
 def _compiled(file: ScenarioFile, path: Path, base: Rig, *, is_hardware: bool = False) -> Rig:
     try:
-        return compiled_rig(file, base, is_hardware=is_hardware)
+        rig = compiled_rig(file, base, is_hardware=is_hardware)
+        groups = groups_of(rig)
+        for number, limit in enumerate(file.limits):
+            expanded(limit, number, groups)
+        return rig
     except KeyTroubleError as error:
         raise ScenarioError(f"{path}: {error}") from error
     except RigError as error:

@@ -143,6 +143,7 @@ def _settling_s(flown: Flown, vehicles: tuple[str, ...], span: Span) -> Value:
     """From the last goal in the span, or its beginning, to where it has settled and stays so for 3 s."""
     track = flown.tracks[vehicles[0]]
     goals = within(track.goals, span.from_s, span.to_s)
+    goals = goals[np.isfinite(goals[:, 1])]
     since_s = float(goals[-1, 0]) if len(goals) else span.from_s
     truth = within(track.truth, since_s, span.to_s)
     rows = station_errors(truth, track.setpoint, -math.inf)
@@ -176,7 +177,7 @@ def _overshoot_mm(flown: Flown, vehicles: tuple[str, ...], span: Span) -> Value:
     for number, goal in enumerate(goals):
         end_s = float(goals[number + 1, 0]) if number + 1 < len(goals) else span.to_s
         truth = within(track.truth, float(goal[0]), end_s)
-        if not len(truth):
+        if not len(truth) or math.isnan(goal[1]):
             continue
         way = goal[1:3] - truth[0, 1:3]
         length_m = float(np.hypot(*way))

@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 
 from drivers.laboratory import LABORATORY_CHANNEL, FailureRefused, InjectOrder
-from groundstation.declarations.errors import RigError
+from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.parts.laboratory.failure_desk import INJECT
 from groundstation.parts.scenario.sections import ScenarioOfRig
@@ -54,6 +54,27 @@ def check_failures(scenario: Scenario) -> None:
                         raise ScenarioError(f"{scenario.path}: {row.where}: {arrival.data.reason}")
     finally:
         laboratory.close()
+
+
+def check_dispersions(scenario: Scenario) -> None:
+    """Draw once, and see whether rig and laboratory take it.
+
+    Raises:
+        ScenarioError: They do not; the sentence names the key.
+    """
+    drawn = draw(scenario, 0, 0)
+    if not drawn:
+        return
+    try:
+        check_failures(scenario.vary(drawn))
+    except UsageError:
+        for key, value in drawn.items():
+            try:
+                check_failures(scenario.vary({key: value}))
+            except UsageError as error:
+                reason = str(error).removeprefix(f"{scenario.path}: ")
+                raise ScenarioError(f"{scenario.path}: dispersions.{key}: {reason}") from error
+        raise
 
 
 def twin_of(rig: Rig) -> Rig:

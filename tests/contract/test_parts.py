@@ -228,7 +228,10 @@ def with_control(place, **control):
 @pytest.mark.parametrize(
     ("control", "sentence"),
     [
-        ({"controller": "hoover"}, "{}.control: controller 'hoover' is none of formation, go_to, station"),
+        (
+            {"controller": "hoover"},
+            "{}.control: controller 'hoover' is none of follow, formation, go_to, path, station",
+        ),
         (
             {"controller": "go_to", "parameters": {"speeed_m_s": 0.1}},
             "{}.control.parameters.speeed_m_s: is no parameter of this controller (a typo?)",
