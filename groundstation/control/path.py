@@ -83,6 +83,7 @@ class Path:
         """Forget the way: the next update starts to the first waypoint."""
         self._station.reset()
         self._next = 0
+        self._heading_rad = 0.0
         self._way: PointReference | None = None
         self._turn: PointReference | None = None
         self._reference: Goal | None = None
@@ -112,18 +113,16 @@ class Path:
         here = state.position_table_m
         if way is None or math.dist(way.position, here) > self._config.restart_error_m:
             way = PointReference(self._limits, here, state.velocity_table_m_s)
+            self._begin_leg(here)
         if turn is None:
             turn = PointReference(self._turn_limits, (state.heading_rad, 0.0), (state.rate_rad_s, 0.0))
-            self._held_rad = state.heading_rad
-        if way.is_at_goal:
-            self._take_next()
-        there = self._config.waypoints_m[self._next]
-        wanted_rad = self._held_rad
-        if self._config.heading == "along" and math.dist(way.position, there) > 0.0:
-            wanted_rad = math.atan2(there[1] - way.position[1], there[0] - way.position[0])
-            self._held_rad = wanted_rad
-        way.advance(there, (0.0, 0.0), dt_s)
-        turn.advance((turn.position[0] + wrap_angle(wanted_rad - turn.position[0]), 0.0), (0.0, 0.0), dt_s)
+            if self._config.heading == "held":
+                self._heading_rad = state.heading_rad
+        if way.is_at_goal and self._take_next():
+            self._begin_leg(way.position)
+        aim_rad = turn.position[0] + wrap_angle(self._heading_rad - turn.position[0])
+        way.advance(self._config.waypoints_m[self._next], (0.0, 0.0), dt_s)
+        turn.advance((aim_rad, 0.0), (0.0, 0.0), dt_s)
         self._way, self._turn = way, turn
         return Goal(
             way.position,
@@ -134,9 +133,15 @@ class Path:
             turn.acceleration[0],
         )
 
-    def _take_next(self) -> None:
+    def _begin_leg(self, here: Vector2) -> None:
+        there = self._config.waypoints_m[self._next]
+        if self._config.heading == "along" and here != there:
+            self._heading_rad = math.atan2(there[1] - here[1], there[0] - here[0])
+
+    def _take_next(self) -> bool:
+        """Whether there is another waypoint to go to."""
         last = len(self._config.waypoints_m) - 1
-        if self._next < last:
-            self._next += 1
-        elif self._config.closed:
-            self._next = 0
+        if self._next == last and not (self._config.closed and last):
+            return False
+        self._next = 0 if self._next == last else self._next + 1
+        return True

@@ -1,6 +1,7 @@
 """A lockstep run of a rig, made by one call: for examples, tests, scenarios, campaigns."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 from pydantic import ValidationError
 
@@ -28,6 +29,7 @@ def make_runner(
     extra_nodes: Iterable[Node] = (),
     requests: Iterable[Request] = (),
     journaled: bool = True,
+    replaced: Mapping[str, Node] = MappingProxyType({}),
 ) -> LockstepRunner:
     """Build everything that a rig names, on one thread and in virtual time.
 
@@ -38,6 +40,7 @@ def make_runner(
         extra_nodes: Nodes beside those of the rig, the last to receive.
         requests: What is asked of vehicles, each at its stamp.
         journaled: Whether the run can be replayed and its causes named.
+        replaced: Nodes that stand in the place of the rig's, by key: ``alpha/controller``.
 
     Raises:
         RigError: The rig has no laboratory, its laboratory refuses its table, or a node its configuration.
@@ -45,7 +48,7 @@ def make_runner(
     journal, sequences = JournalWriter() if journaled else NoJournal(), Sequences()
     laboratory = open_laboratory(rig, seed)
     try:
-        slots = build_slots(rig, None, journal, sequences, name=PROCESS, measure=False)
+        slots = build_slots(rig, None, journal, sequences, name=PROCESS, measure=False, replaced=replaced)
     except ValueError as error:  # a file of our calibration
         raise RigError(str(error)) from error
     extra = list(extra_nodes)

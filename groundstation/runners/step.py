@@ -5,6 +5,7 @@ a node has published, and carries out what the step asks of its ``Transport``.
 """
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Protocol
 
 from groundstation.bus.envelope import Delivered, Envelope
@@ -203,6 +204,7 @@ def build_slots(
     *,
     name: str = "",
     measure: bool = True,
+    replaced: Mapping[str, Node] = MappingProxyType({}),
 ) -> list[Slot]:
     """Build the nodes of a process, or of all processes if None, in the order of the tables.
 
@@ -213,6 +215,7 @@ def build_slots(
         sequences: Of the process.
         name: What the process is called where it runs all nodes.
         measure: Whether wall and CPU times are measured.
+        replaced: Nodes that stand in the place of the rig's, by key.
 
     Raises:
         ValueError: A node refuses its configuration.
@@ -224,5 +227,6 @@ def build_slots(
         timing = Timing()
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
-        slots.append(Slot(row.key(vehicle), node, process or name, journal, sequences, measure, timing))
+        key = row.key(vehicle)
+        slots.append(Slot(key, replaced.get(key, node), process or name, journal, sequences, measure, timing))
     return slots

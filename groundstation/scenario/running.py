@@ -1,10 +1,13 @@
 """A scenario flown: in virtual time here; live runs are judged by their recordings."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
+from groundstation.control.controller import Controller
 from groundstation.declarations.errors import RigError
 from groundstation.launch.lockstep_run import run_lockstep, run_until
+from groundstation.parts.control.part import controller_node
 from groundstation.parts.scenario.messages import RUNNING, WAITING
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
@@ -45,16 +48,28 @@ def seed_for(scenario: Scenario, seed: int | None) -> int:
         raise ScenarioError(f"{scenario.path}: {error}") from error
 
 
-def fly(scenario: Scenario, seed: int, progress: Progress = silent) -> Judged:
+def fly(
+    scenario: Scenario,
+    seed: int,
+    progress: Progress = silent,
+    laws: Mapping[str, Controller] = MappingProxyType({}),
+) -> Judged:
     """Fly in virtual time and record nothing: campaigns, notebooks, dry runs.
+
+    Args:
+        scenario: What to fly.
+        seed: Of the laboratory.
+        progress: Called now and then.
+        laws: Controllers in the place of the scenario's, by vehicle.
 
     Raises:
         ScenarioError: The laboratory refuses what the scenario changes.
         NodeError: A node raised something.
     """
     log = FlightLog(tuple(scenario.rig.vehicles))
+    replaced = {f"{name}/controller": controller_node(scenario.rig, name, law) for name, law in laws.items()}
     try:
-        runner = make_runner(scenario.rig, seed, [log.observe], journaled=False)
+        runner = make_runner(scenario.rig, seed, [log.observe], journaled=False, replaced=replaced)
     except RigError as error:
         raise ScenarioError(f"{scenario.path}: {error}") from error
     try:

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from groundstation.control.controller import Controller
 from groundstation.control.controllers import ControllerRow, controllers, make_controller
 from groundstation.control.state import Goal
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
@@ -32,22 +33,33 @@ def _process(rig: Rig, vehicle: str) -> str:
 
 
 def _controller(rig: Rig, vehicle: str) -> Node:
+    return controller_node(rig, vehicle)
+
+
+def controller_node(rig: Rig, vehicle: str, law: Controller | None = None) -> ControllerNode:
+    """The controller of a vehicle.
+
+    Args:
+        rig: The rig.
+        vehicle: Its name.
+        law: A law in place of the rig's: in virtual time, where nodes and caller share a process.
+    """
     section, hold = control_of(rig, vehicle)[0], rig.vehicles[vehicle].hold
     row, keep_in = _row(rig, vehicle), rig.table.keep_in()
     config = row.config.model_validate(section.parameters)
-    law = row.make(config, rig.type_of(vehicle).model(), keep_in)
-    goal = Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg))
+    model = rig.type_of(vehicle).model()
+    has_program = row.has_program and law is None
     return ControllerNode(
         vehicle,
-        law,
-        section.controller,
-        goal,
+        law or row.make(config, model, keep_in),
+        section.controller if law is None else type(law).__name__,
+        Goal((hold.x_m, hold.y_m), math.radians(hold.heading_deg)),
         keep_in,
-        row.neighbours(config),
+        tuple(name for name in rig.vehicles if name != vehicle) if law else row.neighbours(config),
         tuple(name for name in rig.vehicles if name != vehicle),
         rig.type_of(vehicle).valves.period_s,
         rig.table.slope_grid(),
-        make_controller(HOLDING, {}, rig.type_of(vehicle).model(), keep_in) if row.has_program else None,
+        make_controller(HOLDING, {}, model, keep_in) if has_program else None,
         waits=section.waits,
     )
 
