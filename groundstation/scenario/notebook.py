@@ -14,7 +14,7 @@ from typing import Any
 
 from groundstation.control.controller import NO_NEIGHBOURS, Controller
 from groundstation.control.state import BodyWrench, ControlState, Goal
-from groundstation.scenario.flight_log import Array
+from groundstation.scenario.flight_log import Array, VehicleTrack
 from groundstation.scenario.judging import Judged
 from groundstation.scenario.loading import Scenario
 from groundstation.scenario.rehearsal import check_failures
@@ -119,7 +119,7 @@ class Flown:
 
         return pandas.DataFrame(self.truth(vehicle).T, columns=list(COLUMNS))
 
-    def _tracks(self, vehicle: str) -> Any:  # noqa: ANN401 a track, whose type stays inside
+    def _tracks(self, vehicle: str) -> VehicleTrack:
         if self.judged.flown is None:
             raise ValueError(f"nothing was flown: {self.reason}")
         return self.judged.flown.tracks[vehicle]
