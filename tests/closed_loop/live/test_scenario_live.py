@@ -1,0 +1,77 @@
+"""A scenario flown live: its verdict is the exit code, its recording replays, a broken limit is named."""
+
+import pytest
+
+from groundstation.parts.scenario.messages import Marker, ScenarioStatus
+from groundstation.recording.reader import Recording
+
+pytestmark = pytest.mark.slow
+
+SCENARIO = """
+name = "live"
+rig = "{rig}"
+duration_s = 8.0
+
+[vehicles.beta]
+may_land = true
+
+[[timeline]]
+at_s = 1.0
+vehicle = "alpha"
+request = "go_to"
+arguments = {{ x_m = -0.4, y_m = 0.1, heading_deg = 30.0 }}
+[[timeline]]
+at_s = 2.0
+vehicle = "all"
+failure = "dead_sky"
+for_s = 0.5
+[[timeline]]
+at_s = 3.0
+vehicle = "beta"
+request = "land"
+[[timeline]]
+when = "beta.landed"
+timeout_s = 4.0
+mark = "beta is down"
+
+[[limits]]
+what = "contacts"
+vehicle = "all"
+below = 1.0
+[[limits]]
+what = "gas_ns"
+vehicle = "alpha"
+{gas}
+"""
+
+
+@pytest.fixture
+def scenario(two_drawn, tmp_path):
+    """Writes a scenario of two mock-ups with drawn fixes."""
+
+    def write(gas):
+        path = tmp_path / "scenario.toml"
+        path.write_text(SCENARIO.format(rig=two_drawn, gas=gas))
+        return path
+
+    return write
+
+
+def test_a_scenario_that_holds_ends_with_0_by_itself_and_replays(launch, scenario, replayed):
+    run = launch(scenario("above = 0.0"))
+    assert run.wait(60.0) == 0, run.text
+    assert "verdict: passed" in run.text
+    assert "marker: beta is down" in run.text
+    with Recording(run.recording) as recording:
+        (marker,) = [each.payload for each in recording.delivered([Marker])]
+        states = [each.payload.state for each in recording.delivered([ScenarioStatus])]
+    assert marker.text == "beta is down"
+    assert states[-1] == "ended"
+    replayed(run.recording)
+
+
+def test_a_limit_that_breaks_ends_with_1_and_is_named(launch, scenario):
+    run = launch(scenario("below = 0.0"))
+    assert run.wait(60.0) == 1, run.text
+    assert "FAILED gas_ns of alpha is " in run.text
+    assert "verdict: failed: gas_ns of alpha" in run.text
