@@ -1,6 +1,6 @@
 """A lockstep run of a rig, made by one call: for examples, tests, scenarios, campaigns."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from pydantic import ValidationError
@@ -73,7 +73,7 @@ def open_laboratory(rig: Rig, seed: int | None) -> Laboratory:
     try:
         return load_laboratory(rig.laboratory.name, rig.laboratory.table, seed_of(rig, seed))
     except ValidationError as error:
-        raise RigError(_sentence(error)) from error
+        raise RigError(_sentence(error, rig.laboratory.table)) from error
     except (NotFound, ValueError) as error:  # or a file of the laboratory
         raise RigError(str(error)) from error
 
@@ -93,9 +93,20 @@ def seed_of(rig: Rig, seed: int | None) -> int:
     return found
 
 
-def _sentence(error: ValidationError) -> str:
+def _sentence(error: ValidationError, table: Mapping[str, object]) -> str:
     first = error.errors()[0]
-    key = ".".join(str(part) for part in ("laboratory", *first["loc"]))
+    key = ".".join(("laboratory", *_named(first["loc"], table)))
     if first["type"] == "extra_forbidden":
         return f"'{key}' is no known key (a typo?)"
     return f"{key}: {first['msg'].removeprefix('Value error, ')}"
+
+
+def _named(way: Sequence[object], table: object) -> Iterator[str]:
+    """The keys of a way; an entry of a list of tables by its name, as the rig's people know it."""
+    for step in way:
+        if isinstance(table, list) and isinstance(step, int) and step < len(table):
+            table = table[step]
+            yield str(table.get("name", step) if isinstance(table, dict) else step)
+        else:
+            table = table.get(step) if isinstance(table, dict) else None
+            yield str(step)

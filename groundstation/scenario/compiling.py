@@ -34,6 +34,9 @@ Changes = dict[str, Any]
 Groups = Mapping[str, tuple[str, ...]]
 
 
+OWN_SECTION = "scenario"
+
+
 class KeyTroubleError(ValueError):
     """What is wrong with a scenario; the text begins with the key."""
 
@@ -69,7 +72,7 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
         "resumed": [name for name in starters if _has_program(changed, name)],
         "timeline": list(_rows(file, changed, groups)),
     }
-    return varied(changed, {"scenario": section})
+    return varied(changed, {OWN_SECTION: section})
 
 
 def groups_of(rig: Rig) -> dict[str, tuple[str, ...]]:
@@ -96,6 +99,8 @@ def expanded(limit: Limit, number: int, groups: Groups) -> list[tuple[str, ...]]
 def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
     changes: Changes = {}
     for key, value in file.changes.items():
+        if key.partition(".")[0] == OWN_SECTION:
+            raise KeyTroubleError(f"changes.{key}: '{OWN_SECTION}' is what the timeline is written into")
         if not (is_hardware and key.startswith("laboratory.")):
             changes[key] = value
     for name, keys in file.vehicles.items():

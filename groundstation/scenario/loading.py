@@ -157,7 +157,7 @@ def _set(content: dict[str, Any], key: str, value: object, path: Path, base: Rig
         if isinstance(found, list):
             found = found[int(name)] if name.isdigit() and int(name) < len(found) else None
         elif isinstance(found, dict):
-            found = found.setdefault(name, {})
+            found = found.setdefault(name, {}) if way[0] == "vehicles" else found.get(name)
         if not isinstance(found, dict | list):
             raise UsageError(f"{path}: {'.'.join(way[: place + 1])}: the scenario has no such table")
     if not isinstance(found, dict):

@@ -145,6 +145,12 @@ class Run:
         landed = any("LANDED BY A FAULT" in line for line in self.lines)
         assert code == int(landed), "\n".join(self.lines[-20:])
 
+    def ends_by_itself(self, timeout_s=120.0):
+        """Wait for the end; return exit code and all that was said."""
+        code = self.process.wait(timeout_s)
+        self._reader.join(5)
+        return code, "\n".join(self.lines)
+
     def end(self, number=signal.SIGTERM):
         """Ask for the end; return exit code and the seconds that it took."""
         begin_s = time.monotonic()

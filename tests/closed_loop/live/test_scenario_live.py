@@ -2,6 +2,7 @@
 
 import pytest
 
+from groundstation.cli.main import call
 from groundstation.parts.scenario.messages import Marker, ScenarioStatus
 from groundstation.recording.reader import Recording
 
@@ -57,21 +58,23 @@ def scenario(two_drawn, tmp_path):
     return write
 
 
-def test_a_scenario_that_holds_ends_with_0_by_itself_and_replays(launch, scenario, replayed):
+def test_a_scenario_that_holds_ends_with_0_by_itself_and_replays(launch, scenario, capsys):
     run = launch(scenario("above = 0.0"))
-    assert run.wait(60.0) == 0, run.text
-    assert "verdict: passed" in run.text
-    assert "marker: beta is down" in run.text
+    code, said = run.ends_by_itself()
+    assert code == 0, said
+    assert "verdict: passed" in said
+    assert "marker: beta is down" in said
     with Recording(run.recording) as recording:
         (marker,) = [each.payload for each in recording.delivered([Marker])]
         states = [each.payload.state for each in recording.delivered([ScenarioStatus])]
     assert marker.text == "beta is down"
     assert states[-1] == "ended"
-    replayed(run.recording)
+    assert call(["replay", str(run.recording)]) == 0, capsys.readouterr().out
 
 
 def test_a_limit_that_breaks_ends_with_1_and_is_named(launch, scenario):
     run = launch(scenario("below = 0.0"))
-    assert run.wait(60.0) == 1, run.text
-    assert "FAILED gas_ns of alpha is " in run.text
-    assert "verdict: failed: gas_ns of alpha" in run.text
+    code, said = run.ends_by_itself()
+    assert code == 1, said
+    assert "FAILED gas_ns of alpha is " in said
+    assert "verdict: failed: gas_ns of alpha" in said
