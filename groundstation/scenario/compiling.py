@@ -113,7 +113,7 @@ def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
         if keys.start is not None:
             changes[f"laboratory.{name}.start_m"] = [keys.start.x_m, keys.start.y_m]
             changes[f"laboratory.{name}.start_heading_deg"] = keys.start.heading_deg
-        changes |= {f"laboratory.{name}.{key}": value for key, value in keys.laboratory.items()}
+        changes |= dict(_leaves(f"laboratory.{name}", keys.laboratory))
     for name in rig.vehicles:  # programs begin at t = 0, whoever chose them
         keys_of = file.vehicles.get(name)
         if keys_of is not None and keys_of.control is not None:
@@ -122,6 +122,15 @@ def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
             section = control_of(rig, name)[0]
             changes[f"vehicles.{name}.control"] = {**section.model_dump(), "waits": True}
     return changes
+
+
+def _leaves(key: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Values of nested tables by their keys: what a table leaves out stays as it is."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(f"{key}.{name}", value)
+        else:
+            yield f"{key}.{name}", value
 
 
 def _starts_by_itself(rig: Rig, vehicle: str) -> bool:

@@ -150,14 +150,14 @@ def _compiled(file: ScenarioFile, path: Path, base: Rig, *, is_hardware: bool = 
 def _set(content: dict[str, Any], key: str, value: object, path: Path, base: Rig) -> None:
     *way, last = key.split(".")
     found: Any = content
-    if way[0] == "vehicles" and way[2:] == ["start"] and way[1] in base.vehicles:
+    if way[:1] == ["vehicles"] and way[2:] == ["start"] and way[1] in base.vehicles:
         keys = content.setdefault("vehicles", {}).setdefault(way[1], {})
         keys.setdefault("start", base.vehicles[way[1]].hold.model_dump())
     for place, name in enumerate(way):
         if isinstance(found, list):
             found = found[int(name)] if name.isdigit() and int(name) < len(found) else None
         elif isinstance(found, dict):
-            found = found.setdefault(name, {}) if way[0] == "vehicles" else found.get(name)
+            found = found.setdefault(name, {}) if way[:1] == ["vehicles"] else found.get(name)
         if not isinstance(found, dict | list):
             raise UsageError(f"{path}: {'.'.join(way[: place + 1])}: the scenario has no such table")
     if not isinstance(found, dict):
