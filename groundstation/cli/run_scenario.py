@@ -69,6 +69,9 @@ def run_scenario(flight: Flight) -> int:
         judged = _flown(scenario, flight, seed, recording)
     except UsageError:
         raise
+    except KeyboardInterrupt:
+        sys.stderr.write("groundstation: ended by hand, so there is no verdict\n")
+        return WRONG
     except (GroundStationError, NodeError, RecordingError) as error:
         sys.stderr.write(f"groundstation: {error}\n")
         return WRONG
@@ -130,7 +133,8 @@ class _Watch:
             status = codec_of(ScenarioStatus).decode(recorded.data)
         except CodecError:
             return  # garbled: the next one comes in a fifth of a second
-        self.is_over = status.state not in (WAITING, RUNNING)
+        was_begun = self._last[0] not in ("", WAITING)
+        self.is_over = status.state not in (WAITING, RUNNING) or (was_begun and status.state == WAITING)
         now = status.state, status.fired
         if now != self._last:
             self._last = now

@@ -16,7 +16,7 @@ from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.laboratory.messages import InjectedFailure
 from groundstation.parts.reference.messages import ReferenceState
-from groundstation.parts.scenario.messages import Marker, ScenarioStatus
+from groundstation.parts.scenario.messages import WAITING, Marker, ScenarioStatus
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveCommand
 from groundstation.watch.verdict import RunEvent
@@ -61,12 +61,14 @@ class FlightLog:
         vehicles: Rows by vehicle.
         status: The newest of the player.
         zero_ns: Stamp of t = 0; None before.
+        was_started_again: The player died in flight: it forgot what it had asked.
     """
 
     def __init__(self, vehicles: tuple[str, ...]) -> None:
         self.vehicles = {name: VehicleRows() for name in vehicles}
         self.status: ScenarioStatus | None = None
         self.zero_ns: int | None = None
+        self.was_started_again = False
         self.last_ns = 0
         self._events: list[tuple[int, str, str, str]] = []
         self._asked: dict[tuple[str, int], Request] = {}
@@ -79,6 +81,8 @@ class FlightLog:
         """Take a message that was published at a moment."""
         self.last_ns = now_ns
         if isinstance(message, ScenarioStatus):
+            before = self.status.state if self.status is not None else WAITING
+            self.was_started_again |= before != WAITING and message.state == WAITING
             self.status = message
             if message.zero_ns:
                 self.zero_ns = message.zero_ns

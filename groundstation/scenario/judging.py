@@ -9,6 +9,7 @@ from groundstation.declarations.rig import Rig
 from groundstation.parts.control.sections import control_of
 from groundstation.parts.scenario.messages import ENDED
 from groundstation.parts.scenario.part import bounds_of
+from groundstation.parts.scenario.player import STARTED_AGAIN
 from groundstation.scenario.compiling import expanded, groups_of
 from groundstation.scenario.flight_log import FlightLog
 from groundstation.scenario.loading import Scenario
@@ -110,6 +111,8 @@ def _not_reached(scenario: Scenario) -> Iterator[LimitOutcome]:
 
 def _went_wrong(scenario: Scenario, log: FlightLog) -> str:
     """Why the run failed whatever its limits; empty if it did not."""
+    if log.was_started_again:
+        return STARTED_AGAIN
     if log.status is None or log.status.state != ENDED:
         reason = log.status.reason if log.status is not None else ""
         return reason or "the run ended before its scenario did"

@@ -1,6 +1,10 @@
 """The ready scenarios fly in lockstep with their verdicts; a broken limit, a wait, a vehicle are named."""
 
+import os
 import re
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest

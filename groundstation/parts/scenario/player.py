@@ -19,6 +19,7 @@ STATUS_NS = 200_000_000
 PATIENCE_NS = 5_000_000_000
 """An answer that takes longer will not come."""
 RESUME = "resume"
+STARTED_AGAIN = "the player was started again, and a timeline is not carried out twice"
 
 
 class Player(Node):
@@ -77,7 +78,10 @@ class Player(Node):
                 known.setpoint_table_m = message.goal_position_table_m
                 known.setpoint_heading_rad = message.goal_heading_rad
             case Supervision():
-                self._known[message.vehicle].mode = message.mode
+                known = self._known[message.vehicle]
+                if not known.mode and message.is_in_flight:  # at its first sight
+                    self._fail(f"{message.vehicle} flew already: {STARTED_AGAIN}")
+                known.mode = message.mode
             case Ack() if message.author == AUTHOR:
                 self._answered(message)
         return iter(())

@@ -1,8 +1,12 @@
 """A scenario flown live: its verdict is the exit code, its recording replays, a broken limit is named."""
 
+import os
+import signal
+
 import pytest
 
 from groundstation.cli.main import call
+from groundstation.declarations.request import Request
 from groundstation.parts.scenario.messages import Marker, ScenarioStatus
 from groundstation.recording.reader import Recording
 
@@ -78,3 +82,16 @@ def test_a_limit_that_breaks_ends_with_1_and_is_named(launch, scenario):
     assert code == 1, said
     assert "FAILED gas_ns of alpha is " in said
     assert "verdict: failed: gas_ns of alpha" in said
+
+
+def test_a_player_that_dies_ends_the_run_and_asks_nothing_twice(launch, scenario):
+    run = launch(scenario("above = 0.0"))
+    run.wait_for("scenario running, 1 rows done")
+    os.kill(run.pids()["station"], signal.SIGKILL)
+    code, said = run.ends_by_itself()
+    assert code == 1, said
+    assert "verdict: failed: " in said
+    assert "started again" in said
+    with Recording(run.recording) as recording:
+        asked = [each.payload for each in recording.delivered([Request]) if each.payload.author == "scenario"]
+    assert [each.action for each in asked].count("go_to") == 1

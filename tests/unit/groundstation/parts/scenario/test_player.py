@@ -47,6 +47,7 @@ class Run:
             self._take(self.player.tick(now_ns))
 
     def fly(self):
+        self.until(STEP_MS)
         self.modes = dict.fromkeys(self.modes, "flying")
 
     def of(self, kind):
@@ -74,6 +75,7 @@ def row(**keys):
 
 def test_zero_is_when_the_last_one_flies():
     run = Run(row(at_s=1.0, mark="one"))
+    run.until(20)
     run.modes["alpha"] = "flying"
     run.until(1000)
     assert run.status.state == "waiting"
@@ -110,9 +112,9 @@ def test_on_hardware_zero_also_waits_until_they_have_settled_at_their_starts():
 def test_programs_are_begun_at_zero():
     run = Run(resumed=("beta",))
     run.fly()
-    run.until(20)
+    run.until(40)
     ((at_ms, asked),) = run.of(Request)
-    assert (at_ms, asked.vehicle, asked.action, asked.author) == (20, "beta", "resume", "scenario")
+    assert (at_ms - 20, asked.vehicle, asked.action, asked.author) == (20, "beta", "resume", "scenario")
 
 
 def test_each_vehicle_of_a_row_is_asked_with_an_id_of_its_own():
@@ -169,9 +171,9 @@ def test_a_wait_begins_where_the_row_above_was_carried_out_and_its_delay_where_i
     second = TimelineRow(where="timeline.1", when="alpha.settled", timeout_s=6.0, after_s=0.5, mark="two")
     run = Run(first, second)
     run.fly()
-    run.until(10_020)
-    # settled since the start, but counted from the row above: 1 s + 3 s + 0.5 s after t = 0 at 20 ms
-    assert [(at_ms, marker.text) for at_ms, marker in run.of(Marker)] == [(1020, "one"), (4520, "two")]
+    run.until(10_040)
+    # settled since the start, but counted from the row above: 1 s + 3 s + 0.5 s after t = 0 at 40 ms
+    assert [(at_ms, marker.text) for at_ms, marker in run.of(Marker)] == [(1040, "one"), (4540, "two")]
     assert run.status.state == "ended"
 
 
@@ -200,3 +202,12 @@ def test_a_row_that_had_not_come_when_the_run_ended_fails_it():
     run.until(1100)
     assert run.status.state == "failed"
     assert run.status.reason == "timeline.0: had not come when the run ended"
+
+
+def test_who_is_started_again_while_they_fly_carries_nothing_out_twice():
+    run = Run(row(at_s=0.0, vehicles=("alpha",), action="land"))
+    run.modes = dict.fromkeys(run.modes, "flying")
+    run.until(100)
+    assert run.status.state == "failed"
+    assert "alpha flew already" in run.status.reason
+    assert run.of(Request) == []
