@@ -88,6 +88,21 @@ def test_options_that_do_not_go_together_are_refused(file, words, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+def test_who_ends_a_run_by_hand_gets_no_verdict(file, tmp_path):
+    path = file(SHORT.replace("duration_s = 6.0", "duration_s = 3600.0"))
+    record = tmp_path / "run.mcap"
+    words = [sys.executable, "-m", "groundstation", "run", str(path), "--lockstep", "--record", str(record)]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as run:
+        part = record.with_name("run.mcap.part")
+        while run.poll() is None and not (part.exists() and part.stat().st_size > 50_000):
+            os.sched_yield()
+        run.send_signal(signal.SIGINT)
+        _, said = run.communicate(timeout=60)
+    assert run.returncode == 3
+    assert said == "groundstation: ended by hand, so there is no verdict\n"
+    assert record.exists()  # what was flown can be looked at
+
+
 def test_a_vehicle_that_comes_down_fails_the_run_unless_it_may_land(file):
     lands = '\n[[timeline]]\nat_s = 2.0\nvehicle = "beta"\nrequest = "land"\n'
     flown = scenario.run(scenario.load(file(SHORT + lands)))
