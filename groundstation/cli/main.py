@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import typer
 
 COMMANDS: dict[str, Row] = {
-    "run": Command("groundstation.cli.run:app", "Fly the vehicles of a rig."),
+    "run": Command("groundstation.cli.run:app", "Fly the vehicles of a rig, or a scenario."),
     "replay": Command(
         "groundstation.cli.replay:app", "Feed a recording through the nodes again and compare."
     ),
