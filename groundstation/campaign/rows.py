@@ -1,0 +1,192 @@
+"""Rows of a campaign on disk: in order, each there as soon as its run is over, none twice.
+
+``runs.csv`` holds the rows in order. Runs that are over before an earlier one wait in ``unordered.jsonl``
+beside it, which is gone when all are in order. A line that a crash has torn is flown again.
+"""
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+from groundstation.campaign.errors import CampaignError
+from groundstation.campaign.flying import Row
+from groundstation.files.errors import FileError
+from groundstation.files.writing import write_file
+
+CSV, WAITING, STATED = "runs.csv", "unordered.jsonl", "campaign.json"
+
+
+class Rows:
+    """The rows of a folder; use it as a context manager.
+
+    Args:
+        folder: Of the campaign; made if it is not there.
+        columns: Of the rows.
+        identity: What has to be equal for a campaign to be continued.
+        resume: Whether one that is there is continued.
+
+    Raises:
+        CampaignError: There is a campaign, and it is not to be continued or is another one; or the folder
+            cannot be written.
+    """
+
+    def __init__(
+        self, folder: Path, columns: tuple[str, ...], identity: Mapping[str, object], *, resume: bool
+    ) -> None:
+        self._folder = folder
+        self._columns = columns
+        self._waiting: dict[int, Row] = {}
+        self._next = 0
+        stated = json.dumps(identity, sort_keys=True, indent=1) + "\n"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._check(stated, resume=resume)
+            known = self._known() if resume else {}
+            write_file(folder / STATED, stated)
+            self._csv = self._begun(known)
+            self._journal: TextIO | None = None
+            for run, row in known.items():
+                if run >= self._next:
+                    self._waiting[run] = row
+            self._rewrite_journal()
+        except (OSError, FileError) as error:
+            raise CampaignError(f"{folder}: cannot be written ({error})") from error
+
+    @property
+    def done(self) -> set[int]:
+        """Runs that have been flown."""
+        return {*range(self._next), *self._waiting}
+
+    def add(self, run: int, row: Row) -> None:
+        """Keep the row of a run that is over: on disk when this returns.
+
+        Raises:
+            CampaignError: The disk is full, or gone.
+        """
+        if run < self._next or run in self._waiting:
+            return
+        try:
+            self._waiting[run] = row
+            if run != self._next:
+                self._put_journal(run, row)
+                return
+            while self._next in self._waiting:
+                self._csv.write(self._line(self._waiting.pop(self._next)))
+                self._next += 1
+            _to_disk(self._csv)
+            if not self._waiting:
+                self._drop_journal()
+        except OSError as error:
+            raise CampaignError(
+                f"{self._folder / CSV} cannot be written any further ({error.strerror}): make room and go on "
+                "with --resume"
+            ) from error
+
+    def read(self) -> list[Row]:
+        """The rows in order."""
+        return list(_rows_of(self._folder / CSV, self._columns).values())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._csv.close()
+        if self._journal is not None:
+            self._journal.close()
+
+    # -- what was there before ------------------------------------------------------------------------
+
+    def _check(self, stated: str, *, resume: bool) -> None:
+        path = self._folder / STATED
+        if not path.exists():
+            if any((self._folder / name).exists() for name in (CSV, WAITING)):
+                raise CampaignError(f"{self._folder} holds rows, but does not say of what: choose another folder")
+            return
+        if not resume:
+            raise CampaignError(f"{self._folder} holds a campaign: --resume goes on with it")
+        if path.read_text(encoding="utf-8") != stated:
+            raise CampaignError(
+                f"{self._folder} holds another campaign: scenario, --seed or --sweep differ from {path}"
+            )
+
+    def _known(self) -> dict[int, Row]:
+        known = _rows_of(self._folder / CSV, self._columns)
+        journal = self._folder / WAITING
+        for line in journal.read_text(encoding="utf-8").splitlines() if journal.exists() else ():
+            try:
+                row = json.loads(line)
+            except ValueError:
+                continue  # torn: flown again
+            if isinstance(row, dict) and tuple(row) == self._columns and str(row["run"]).isdigit():
+                known.setdefault(int(row["run"]), row)
+        return known
+
+    def _begun(self, known: Mapping[int, Row]) -> TextIO:
+        """The file with the rows that are in order, written anew."""
+        ordered = []
+        while self._next in known:
+            ordered.append(self._line(known[self._next]))
+            self._next += 1
+        path = self._folder / CSV
+        write_file(path, self._line(dict(zip(self._columns, self._columns, strict=True))) + "".join(ordered))
+        return path.open("a", encoding="utf-8", newline="")
+
+    # -- the journal ----------------------------------------------------------------------------------
+
+    def _put_journal(self, run: int, row: Row) -> None:
+        if self._journal is None:
+            self._journal = (self._folder / WAITING).open("a", encoding="utf-8")
+        self._journal.write(json.dumps(row) + "\n")
+        _to_disk(self._journal)
+        assert row["run"] == str(run)
+
+    def _rewrite_journal(self) -> None:
+        self._drop_journal()
+        for run, row in sorted(self._waiting.items()):
+            self._put_journal(run, row)
+
+    def _drop_journal(self) -> None:
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+        (self._folder / WAITING).unlink(missing_ok=True)
+
+    def _line(self, row: Row) -> str:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerow(row[name] for name in self._columns)
+        return text.getvalue()
+
+
+def _rows_of(path: Path, columns: tuple[str, ...]) -> dict[int, Row]:
+    """Whole rows of a file, up to the first that is torn."""
+    if not path.exists():
+        return {}
+    text = path.read_text(encoding="utf-8", errors="replace")
+    whole = text[: text.rfind("\n") + 1]
+    found: dict[int, Row] = {}
+    for number, cells in enumerate(_cells(whole)):
+        if number == 0:
+            continue
+        if len(cells) != len(columns) or cells[0] != str(number - 1):
+            break
+        found[number - 1] = dict(zip(columns, cells, strict=True))
+    return found
+
+
+def _cells(text: str) -> Iterator[list[str]]:
+    try:
+        yield from csv.reader(io.StringIO(text, newline=""), strict=True)
+    except csv.Error:
+        return  # torn in the middle of a quoted reason: what follows is flown again
+
+
+def _to_disk(file: TextIO) -> None:
+    file.flush()
+    os.fsync(file.fileno())
