@@ -107,7 +107,9 @@ class Rows:
         path = self._folder / STATED
         if not path.exists():
             if any((self._folder / name).exists() for name in (CSV, WAITING)):
-                raise CampaignError(f"{self._folder} holds rows, but does not say of what: choose another folder")
+                raise CampaignError(
+                    f"{self._folder} holds rows, but does not say of what: choose another folder"
+                )
             return
         if not resume:
             raise CampaignError(f"{self._folder} holds a campaign: --resume goes on with it")

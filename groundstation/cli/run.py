@@ -9,7 +9,7 @@ import typer
 
 from groundstation.cli.live_view import run_live
 from groundstation.cli.run_progress import RunProgress
-from groundstation.cli.runs_files import finished_files
+from groundstation.cli.runs_files import check_recording, finished_files
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.files.writing import check_folder
@@ -34,7 +34,7 @@ def run(
         typer.Option(help="End by itself after this many seconds.", min=0.1, max=LONGEST_S),
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Write lines instead of a view.")] = False,
-    report: Annotated[Path | None, typer.Option(help="Leave figures and report.json here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder for report.html and report.json.")] = None,
     record: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="Virtual time, as fast as the CPU allows; needs --duration.")
@@ -64,6 +64,10 @@ def run(
 
     Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
     """
+    if compare is not None:
+        if report is None:
+            raise UsageError("--compare goes with --report: the recording is drawn beside the run")
+        check_recording(compare)
     default_core()  # before any process starts: what it lacks, all of them would
     if is_scenario(read_content(file)):
         if duration is not None:

@@ -1,8 +1,23 @@
-"""The recordings that a run has left."""
+"""Recordings that a run has left, or is to be compared with."""
 
 from pathlib import Path
 
+from groundstation.declarations.errors import UsageError
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.reader import Recording
 from groundstation.recording.writer import PART_SUFFIX
+
+
+def check_recording(path: Path) -> None:
+    """Refuse a recording that cannot be read, before anything moves.
+
+    Raises:
+        UsageError: It says why.
+    """
+    try:
+        Recording(path).close()
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
 
 
 def finished_files(recording: Path) -> tuple[list[Path], list[Path]]:

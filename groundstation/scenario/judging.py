@@ -49,14 +49,26 @@ def judge(scenario: Scenario, log: FlightLog, *, began_ns: int = 0) -> Judged:
         reason = log.status.reason if log.status is not None else ""
         limits = tuple(_not_reached(scenario))
         words = reason or "the run ended before t = 0, when the last vehicle flies"
-        return Judged(Verdict(FAILED, words, limits, log.events(), math.nan), {}, None)
+        return Judged(_verdict(scenario, words, limits, log, 0.0), {}, None)
     seen = flown(scenario, log)
     outcomes = tuple(_outcomes(scenario, seen))
     reason = _went_wrong(scenario, log) or _first_broken(outcomes)
-    verdict = Verdict(
-        FAILED if reason else PASSED, reason, outcomes, seen.events, (zero_ns - began_ns) * 1e-9
-    )
+    verdict = _verdict(scenario, reason, outcomes, log, (zero_ns - began_ns) * 1e-9)
     return Judged(verdict, dict(every_quantity(seen)), seen)
+
+
+def _verdict(
+    scenario: Scenario, reason: str, limits: tuple[LimitOutcome, ...], log: FlightLog, zero_s: float
+) -> Verdict:
+    return Verdict(
+        FAILED if reason else PASSED,
+        reason,
+        limits,
+        log.events(),
+        zero_s,
+        scenario.name,
+        tuple((each.x_m, each.y_m, each.radius_m) for each in scenario.file.obstacles),
+    )
 
 
 def flown(scenario: Scenario, log: FlightLog) -> Flown:
