@@ -164,14 +164,14 @@ class TickClock:
             size = V1_WIRE_BYTES if frame.version == 1 else V2_WIRE_BYTES
             latest_end_ns = arrival_ns - (self._bytes_read - 1 - end) * self._byte_ns
             latest_edge_ns = latest_end_ns - self._send_delay_ns - size * self._byte_ns
-            assert last is not None
-            raw, modulus = _raw_tick(frame)
-            ahead = (_raw_tick(last)[0] - raw) % modulus
-            still = start + last.end_offset - end
-            if ahead * size == still * frame.sample_count:  # nothing is missing up to the newest frame
-                after_ns = (self._bytes_read - 1 - start - last.end_offset) * self._byte_ns
-                newest_edge_ns = arrival_ns - after_ns - self._send_delay_ns - size * self._byte_ns
-                latest_edge_ns = min(latest_edge_ns, newest_edge_ns - ahead * TICK_NS)
+            if last is not None and frame is not last:
+                raw, modulus = _raw_tick(frame)
+                ahead = (_raw_tick(last)[0] - raw) % modulus
+                still = start + last.end_offset - end
+                if ahead * size == still * frame.sample_count:  # nothing is missing up to the newest frame
+                    after_ns = (self._bytes_read - 1 - start - last.end_offset) * self._byte_ns
+                    newest_edge_ns = arrival_ns - after_ns - self._send_delay_ns - size * self._byte_ns
+                    latest_edge_ns = min(latest_edge_ns, newest_edge_ns - ahead * TICK_NS)
             elapsed = self._unwrap(frame, latest_edge_ns, self._silence_ns(end))
             self._learn(frame, end, size, latest_end_ns, is_last=frame is last)
             self._taught.append((self._tick, elapsed))
@@ -202,9 +202,9 @@ class TickClock:
             self._start(raw, latest_edge_ns)
             return None
         elapsed = (raw - self._raw_tick) % modulus
-        late_ns = self._lateness_ns(self._tick + elapsed, latest_edge_ns)
         is_first = raw <= _FIRST_TICKS * frame.sample_count and silence_ns > _PAUSE_NS
         if elapsed != frame.sample_count or is_first:
+            late_ns = self._lateness_ns(self._tick + elapsed, latest_edge_ns)
             wraps = math.floor(
                 (late_ns + _EARLY_NS + self._line_sigma_ns(latest_edge_ns)) / (modulus * TICK_NS)
             )
@@ -313,10 +313,11 @@ class TickClock:
         stamp_ns = wanted_ns
         if self._last_stamp_ns is not None:
             nominal_ns = float((elapsed or 0) * TICK_NS)
-            if self.is_locked and elapsed is not None:
+            is_locked = self.is_locked
+            if is_locked and elapsed is not None:
                 nominal_ns *= 1 + envelope.drift
                 stamp_ns = min(stamp_ns, self._last_stamp_ns + math.floor(nominal_ns * (1 + SLEW_LIMIT)))
-            limit = SLEW_LIMIT if self.is_locked else _UNLOCKED_SLEW_LIMIT
+            limit = SLEW_LIMIT if is_locked else _UNLOCKED_SLEW_LIMIT
             earliest_ns = self._last_stamp_ns + max(1, math.ceil(nominal_ns * (1 - limit)))
             stamp_ns = max(stamp_ns, earliest_ns)
         self._last_stamp_ns = stamp_ns
