@@ -52,7 +52,10 @@ class LinkWait:
             span_ns: from the departure of their first byte to that of their last; None if unknown.
             pause_ns: from the departure of their last byte to that of the next; None if unknown.
         """
-        if (span_ns, pause_ns) != self._asked:  # which change once a second, and are asked about with each frame
+        if (
+            span_ns,
+            pause_ns,
+        ) != self._asked:  # which change once a second, and are asked about with each frame
             self._asked = span_ns, pause_ns
             self._answer = self._wait(span_ns, pause_ns)
         return self._answer

@@ -167,14 +167,15 @@ class Slot:
             return []
         publish_ns = now_ns + wall_ns + self.timing.busy_ns + self.timing.late_ns
         trigger = None if answered is None else answered.as_cause()
+        new = tuple.__new__  # a third of the time of calling a named tuple
         out = []
         for payload in payloads:
             stream = self._streams.get((type(payload), payload.vehicle)) or self._open(payload)
             stream.last += 1
             topic, owner, sequence = stream.topic, stream.owner, stream.last
             self.journal.note(_OUTPUT, self.key, topic.noun, owner, sequence, now_ns, wall_ns)
-            envelope = Envelope(topic, owner, sequence, publish_ns, wall_ns, cpu_ns, trigger)
-            out.append(Delivered(envelope, payload))
+            envelope = new(Envelope, (topic, owner, sequence, publish_ns, wall_ns, cpu_ns, trigger))
+            out.append(new(Delivered, (envelope, payload)))
         return out
 
     def _open(self, payload: Message) -> Stream:

@@ -72,7 +72,9 @@ class Supervisor:
         grace_s = float("inf")
         if memory.is_stop_latched:
             grace_s = GRACE_S if memory.mode in BRAKEABLE else 0.0
-        memory = replace(memory, latched=self.board.latched)
+        latched = self.board.latched
+        if latched != memory.latched:
+            memory = replace(memory, latched=latched)
         return Ruling(memory, guarantee.law, guarantee.may_open, is_air_on, grace_s, self._waits_for)
 
     def recall(self, memory: Memory, now_ns: int) -> None:
