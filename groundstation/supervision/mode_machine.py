@@ -80,7 +80,7 @@ class ModeMachine:
         return self.memory.then
 
     def counts(self, event: Event) -> bool:
-        """Whether the table has a row for it in this mode: asked often, and cheaper than a refusal in words."""
+        """Whether the table has a row for it in this mode: cheaper to ask than a refusal in words."""
         return transition(self.mode, event) is not None
 
     def recall(self, memory: Memory, now_ns: int) -> None:
