@@ -36,6 +36,7 @@ ARMED_LATE_NS = 100_000_000
 AFLOAT_NS = 300_000_000
 """So long after it was disarmed the air may still be on: the order, the report."""
 HEALTHY, PUSHED, PUSH_S = "healthy", "pushed", 0.3
+LARGE_TANK = "valves = { tank_impulse_n_s = 5000.0 }"
 RIG = """
 name = "fault campaign"
 valve_bus = "laboratory:valve_bus"
@@ -244,6 +245,8 @@ def drawn(failure: str, seed: int) -> tuple[np.random.Generator, str, dict[str, 
     start_s = float(rng.uniform(EARLIEST_S, LATEST_S))
     tilt = rng.uniform(-3e-4, 3e-4, 2)
     text = RIG.replace("TILT_X", f"{tilt[0]:.2e}").replace("TILT_Y", f"{tilt[1]:.2e}")
+    if failure == HEALTHY:  # a quarter of an hour of this empties a tank, which is no false alarm
+        text = text.replace("start_m = [-0.9, -0.3]", f"start_m = [-0.9, -0.3]\n{LARGE_TANK}")
     given = parameters_of(failure, rng)
     return rng, text, {"start_s": start_s, **given}
 

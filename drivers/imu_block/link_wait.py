@@ -29,6 +29,8 @@ class LinkWait:
     def __init__(self, timer_ns: float) -> None:
         self.timer_ns = timer_ns
         self._is_measured = False
+        self._asked: tuple[float | None, float | None] | None = None
+        self._answer = (0.0, 0.0)
 
     @property
     def longest_timer_ns(self) -> float:
@@ -37,7 +39,8 @@ class LinkWait:
 
     def measured(self, timer_ns: float) -> None:
         """Take the timer from the adapter itself."""
-        self.timer_ns, self._is_measured = timer_ns, True
+        if not self._is_measured or timer_ns != self.timer_ns:
+            self.timer_ns, self._is_measured, self._asked = timer_ns, True, None
 
     def wait(self, span_ns: float | None, pause_ns: float | None) -> tuple[float, float]:
         """Return the likely wait of the last byte of the packets that waited least, and its sigma, ns.
@@ -49,6 +52,15 @@ class LinkWait:
             span_ns: from the departure of their first byte to that of their last; None if unknown.
             pause_ns: from the departure of their last byte to that of the next; None if unknown.
         """
+        if (
+            span_ns,
+            pause_ns,
+        ) != self._asked:  # which change once a second, and are asked about with each frame
+            self._asked = span_ns, pause_ns
+            self._answer = self._wait(span_ns, pause_ns)
+        return self._answer
+
+    def _wait(self, span_ns: float | None, pause_ns: float | None) -> tuple[float, float]:
         left_ns = self.timer_ns - (span_ns or 0.0)
         longest_ns = math.inf if pause_ns is None else pause_ns
         is_possible = left_ns > -_TOLERANCE_NS

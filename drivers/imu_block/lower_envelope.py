@@ -53,6 +53,8 @@ class LowerEnvelope:
         drift: Slope of the line, within ``DRIFT_LIMIT``.
         scatter_ns: Median height of the seconds' lowest points over the line: a stall is no scatter.
         span_ns, pause_ns: Medians of the points that carry the line, None while unknown.
+        length_ns: Abscissae from the oldest point that is kept to the newest.
+        recent_floor_ns: How far the lowest point of the last half second lay over the line when it came.
     """
 
     def __init__(self) -> None:
@@ -61,25 +63,17 @@ class LowerEnvelope:
         self.scatter_ns = 0.0
         self.span_ns: float | None = None
         self.pause_ns: float | None = None
+        self.length_ns = 0.0
+        self.recent_floor_ns = 0.0
         self._offset_ns = float("inf")
         self._seconds: deque[list[Point]] = deque(maxlen=SECONDS_KEPT)
         self._second_end_ns = -float("inf")
         self._next_fit_ns = float("inf")
         self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_KEPT)
 
-    @property
-    def length_ns(self) -> float:
-        """Abscissae from the oldest point that is kept to the newest."""
-        return self._seconds[-1][-1].x_ns - self._seconds[0][0].x_ns if self._seconds else 0.0
-
     def height_ns(self, x_ns: float) -> float:
         """Return the line's height at ``x_ns``; infinite before the first point."""
         return self._offset_ns + self.drift * x_ns
-
-    @property
-    def recent_floor_ns(self) -> float:
-        """How far the lowest point of the last half second lay over the line when it came."""
-        return min((gap for _, gap in self._recent), default=0.0)
 
     def gap_ns(self, x_ns: float, y_ns: float) -> float:
         """Return how far a point lies over the line."""
@@ -99,6 +93,7 @@ class LowerEnvelope:
             if self.points_seen == 1:
                 self._next_fit_ns = point.x_ns + _FIRST_FIT_NS
         _append_to_hull(self._seconds[-1], point)
+        self.length_ns = point.x_ns - self._seconds[0][0].x_ns
         gap_ns = self.gap_ns(point.x_ns, point.y_ns)
         if gap_ns < 0.0:
             self._offset_ns = point.y_ns - self.drift * point.x_ns
@@ -118,6 +113,7 @@ class LowerEnvelope:
                 recent[-1] = recent[-1][0], gap_ns
         else:
             recent.append((x_ns + _RECENT_NS, gap_ns))
+        self.recent_floor_ns = min([gap for _, gap in recent])
 
     def _fit(self) -> None:
         hull: list[Point] = []

@@ -203,7 +203,7 @@ def _status(vehicle: int, values: Sequence[int]) -> ValveStatus:
         is_stopped=bool(stopped),
         is_float_air_on=bool(floating),
         valve_fault_mask=faulty,
-        node_faults=NodeFault(node_faults),
+        node_faults=node_faults,
         rejected_commands=rejected,
         is_stop_pending=bool(is_pending),
         is_landed_by_silence=bool(is_landed),

@@ -157,7 +157,7 @@ class ImuBlock:
                 gyro_counts=gyro,
                 tilt_counts=tilts,
                 housekeeping=self._housekeeping(temperature_c, status),
-                attention=bool(status & _ATTENTION),
+                attention=bool(status.value & _ATTENTION.value),
             )
         self._send(stamp_ns, frame)
         self._begin_window(self._window_end)

@@ -1,8 +1,8 @@
 """What the runner writes on each payload: where it belongs in the order of things, and what it cost.
 
 Whatever a wall clock measured lives here and never in a payload. The latency ledger is made from
-envelopes, by following causes. Causes name things (noun, owner, sequence), so that no row of a table has a
-meaning in a recording.
+envelopes, by following triggers. A cause names a thing (noun, owner, sequence), so that no row of a table
+has a meaning in a recording. What else a node knew when it published, the journal names.
 """
 
 import struct
@@ -31,8 +31,8 @@ class Envelope(NamedTuple):
         sequence: Counts the publications of one topic of one owner, from 1.
         publish_ns: Host monotonic clock (virtual time in lockstep).
         wall_ns: Wall time the node took over the call that made it, 0 in lockstep.
-        cpu_ns: CPU time of that call, 0 in lockstep.
-        causes: What triggered it first, then the newest of the node's other inputs.
+        trigger: The message that it answers, in a tick the newest of the node's trigger; None where there
+            is none.
     """
 
     topic: Topic
@@ -40,11 +40,14 @@ class Envelope(NamedTuple):
     sequence: int
     publish_ns: int
     wall_ns: int = 0
-    cpu_ns: int = 0
-    causes: tuple[Cause, ...] = ()
+    trigger: Cause | None = None
+
+    def as_cause(self) -> Cause:
+        """What names this message as the cause of another."""
+        return Cause(self.topic.noun, self.owner, self.sequence)
 
     def attachment(self) -> bytes:
-        """What travels with the payload on its own key; cost and causes travel in the record stream."""
+        """What travels with the payload on its own key; cost and trigger travel in the record stream."""
         return _ATTACHMENT.pack(self.sequence, self.publish_ns)
 
     @classmethod

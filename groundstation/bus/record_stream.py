@@ -4,8 +4,8 @@ Recorder, view, console and bridges take this stream and cost the flight nothing
 second through a hub cost far more than twenty large ones. A batch carries its own names, so that entries
 point at them by index and no table of topics is needed to read it.
 
-Layout, little endian: ``magic u32 | names u32 | entries u32 | causes u32 | lengths of names u16 ...`` then
-the names, the entries (``_ENTRY``), the causes (``_CAUSE``) and the payloads, one after the other.
+Layout, little endian: ``magic u32 | names u32 | entries u32 | lengths of names u16 ...`` then the names, the
+entries (``_ENTRY``) and the payloads, one after the other.
 """
 
 import struct
@@ -14,12 +14,11 @@ from typing import NamedTuple
 
 from groundstation.bus.envelope import Cause, Envelope
 
-MAGIC = 0x31535247  # "GRS1"
-_HEAD = struct.Struct("<IIII")
-_ENTRY = struct.Struct("<qIIIIHHHxx")
-"""publish_ns, sequence, wall_ns, cpu_ns, payload's bytes, indices of noun and owner, number of causes."""
-_CAUSE = struct.Struct("<HHI")
-"""Indices of noun and owner, sequence."""
+MAGIC = 0x32535247  # "GRS2"
+_HEAD = struct.Struct("<III")
+_ENTRY = struct.Struct("<qIIIHHHHI")
+"""publish_ns, sequence, wall_ns, payload's bytes, indices of noun and owner; of the trigger the index of its
+noun plus one (0: there is none), the index of its owner and its sequence."""
 _LONGEST_NS = 0xFFFFFFFF
 
 
@@ -33,7 +32,6 @@ class RecordWriter:
     def __init__(self) -> None:
         self._names: dict[str, int] = {}
         self._entries: list[bytes] = []
-        self._causes: list[bytes] = []
         self._payloads: list[bytes] = []
         self.size = 0
 
@@ -42,26 +40,24 @@ class RecordWriter:
 
     def add(self, envelope: Envelope, encoded: bytes) -> None:
         """Add one message."""
-        topic, owner, sequence, publish_ns, wall_ns, cpu_ns, causes = envelope
+        topic, owner, sequence, publish_ns, wall_ns, trigger = envelope
         names = self._names
-        for cause_noun, cause_owner, cause_sequence in causes:
-            self._causes.append(
-                _CAUSE.pack(
-                    names.setdefault(cause_noun, len(names)),
-                    names.setdefault(cause_owner, len(names)),
-                    cause_sequence,
-                )
-            )
+        trigger_noun = trigger_owner = trigger_sequence = 0
+        if trigger is not None:
+            trigger_noun = 1 + names.setdefault(trigger.noun, len(names))
+            trigger_owner = names.setdefault(trigger.owner, len(names))
+            trigger_sequence = trigger.sequence
         self._entries.append(
             _ENTRY.pack(
                 publish_ns,
                 sequence,
                 wall_ns if wall_ns < _LONGEST_NS else _LONGEST_NS,
-                cpu_ns if cpu_ns < _LONGEST_NS else _LONGEST_NS,
                 len(encoded),
                 names.setdefault(topic.noun, len(names)),
                 names.setdefault(owner, len(names)),
-                len(causes),
+                trigger_noun,
+                trigger_owner,
+                trigger_sequence,
             )
         )
         self._payloads.append(encoded)
@@ -70,12 +66,11 @@ class RecordWriter:
     def take(self) -> bytes:
         """The batch so far; the next one begins."""
         names = [name.encode() for name in self._names]
-        head = _HEAD.pack(MAGIC, len(names), len(self._entries), len(self._causes))
+        head = _HEAD.pack(MAGIC, len(names), len(self._entries))
         lengths = struct.pack(f"<{len(names)}H", *map(len, names))
-        packed = b"".join((head, lengths, *names, *self._entries, *self._causes, *self._payloads))
+        packed = b"".join((head, lengths, *names, *self._entries, *self._payloads))
         self._names.clear()
         self._entries.clear()
-        self._causes.clear()
         self._payloads.clear()
         self.size = 0
         return packed
@@ -90,8 +85,7 @@ class Recorded(NamedTuple):
         sequence: Of the publication.
         publish_ns: Moment of the publication.
         wall_ns: Wall time that the node took.
-        cpu_ns: CPU time that it took.
-        causes: What it was made from, the trigger first.
+        trigger: The message that it answers; None where there is none.
         data: CDR bytes of the payload.
     """
 
@@ -100,8 +94,7 @@ class Recorded(NamedTuple):
     sequence: int
     publish_ns: int
     wall_ns: int
-    cpu_ns: int
-    causes: tuple[Cause, ...]
+    trigger: Cause | None
     data: bytes
 
 
@@ -116,7 +109,7 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
         BatchError: The bytes are no batch, or are cut off; nothing is yielded then.
     """
     try:
-        magic, name_count, entry_count, cause_count = _HEAD.unpack_from(data)
+        magic, name_count, entry_count = _HEAD.unpack_from(data)
         if magic != MAGIC:
             raise BatchError(f"no batch of the record stream: it begins with {data[:4].hex()}")
         lengths = struct.unpack_from(f"<{name_count}H", data, _HEAD.size)
@@ -127,15 +120,10 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
             position += length
         stop = position + entry_count * _ENTRY.size
         rows = list(_ENTRY.iter_unpack(data[position:stop]))
-        position = stop + cause_count * _CAUSE.size
-        causes = list(_CAUSE.iter_unpack(data[stop:position]))
         if (
-            position + sum([row[4] for row in rows]) != len(data)
-            or sum([row[7] for row in rows]) != cause_count
+            stop + sum([row[3] for row in rows]) != len(data)
             or len(rows) != entry_count
-            or len(causes) != cause_count
-            or any(row[5] >= name_count or row[6] >= name_count for row in rows)
-            or any(noun >= name_count or owner >= name_count for noun, owner, _ in causes)
+            or (rows and not _are_named(rows, name_count))
         ):
             raise BatchError("a batch of the record stream is cut off")
     except (struct.error, ValueError) as error:
@@ -143,7 +131,14 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
             raise
         raise BatchError(f"a batch of the record stream is cut off ({error})") from error
     wanted = [nouns is None or name in nouns for name in names]
-    return _messages(data, position, names, wanted, rows, causes)
+    return _messages(data, stop, names, wanted, rows)
+
+
+def _are_named(rows: list[tuple[int, ...]], count: int) -> bool:
+    """Whether all entries point at one of the ``count`` names of their batch."""
+    columns: list[tuple[int, ...]] = list(zip(*rows, strict=True))
+    nouns, owners, trigger_nouns, trigger_owners = columns[4:8]
+    return max(nouns + owners + trigger_owners) < count and max(trigger_nouns) <= count
 
 
 def _messages(
@@ -152,17 +147,15 @@ def _messages(
     names: list[str],
     wanted: list[bool],
     rows: list[tuple[int, ...]],
-    causes: list[tuple[int, int, int]],
 ) -> Iterator[Recorded]:
     made = tuple.__new__  # a third of the time of calling a named tuple
-    first = 0
-    for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, count in rows:
-        last, stop = first + count, position + size
+    for publish_ns, sequence, wall_ns, size, noun, owner, of_noun, of_owner, at in rows:
+        stop = position + size
         if wanted[noun]:
-            made_from = tuple([made(Cause, (names[n], names[o], at)) for n, o, at in causes[first:last]])
+            trigger = made(Cause, (names[of_noun - 1], names[of_owner], at)) if of_noun else None
             payload = data[position:stop]
             yield made(
                 Recorded,
-                (names[noun], names[owner], sequence, publish_ns, wall_ns, cpu_ns, made_from, payload),
+                (names[noun], names[owner], sequence, publish_ns, wall_ns, trigger, payload),
             )
-        first, position = last, stop
+        position = stop

@@ -41,7 +41,7 @@ def bounded(vector: Vector2, limit: float) -> Vector2:
 
 
 def _refuse_non_finite(what: str, *values: float) -> None:
-    if not all(map(math.isfinite, values)):
+    if not math.isfinite(sum(values)) and not all(map(math.isfinite, values)):  # a sum is the cheaper look
         raise ValueError(f"{what} must be finite, found {values}")
 
 

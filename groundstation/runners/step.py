@@ -133,10 +133,11 @@ class Step:
     def deliver(self, delivered: Delivered, now_ns: int) -> None:
         """Give a published message to the port that it leaves through and to the nodes that receive it."""
         payload = delivered.payload
-        port = self.writer_of(payload)
+        address = payload.TOPIC.noun, payload.vehicle
+        port = self._writers.get(address)
         if port is not None:
             self._transport.write(port, payload, now_ns)
-        self._give((payload.TOPIC.noun, payload.vehicle), delivered, now_ns)
+        self._give(address, delivered, now_ns)
 
     def receive(self, delivered: Delivered, now_ns: int) -> None:
         """Give a message of another process to the nodes that receive it."""
@@ -180,7 +181,8 @@ class Step:
         if slot.timing.busy_ns:
             slot.busy_until_ns = now_ns + slot.timing.busy_ns
             self._transport.call_back(slot.busy_until_ns, slot)
-        self._publish(made)
+        if made:
+            self._publish(made)
 
     def _publish(self, made: Iterable[Delivered]) -> None:
         publish = self._transport.publish
@@ -214,7 +216,7 @@ def build_slots(
         journal: Of the process.
         sequences: Of the process.
         name: What the process is called where it runs all nodes.
-        measure: Whether wall and CPU times are measured.
+        measure: Whether wall times are measured.
         replaced: Nodes that stand in the place of the rig's, by key.
 
     Raises:

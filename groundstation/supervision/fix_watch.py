@@ -1,5 +1,6 @@
 """Whether fixes come, and whether they come from pictures that are new. Pure."""
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from statistics import median
@@ -27,6 +28,7 @@ class FixWatch:
         self._exposure_ns: int | None = None
         self._recent_ns: deque[int] = deque(maxlen=256)
         self._intervals_s: deque[float] = deque(maxlen=_INTERVALS)
+        self._interval_s = math.inf  # their median
         self._refused = 0
         self._usual_hz = 0.0
         self._marks: dict[str, tuple[int, str]] = {}
@@ -36,6 +38,7 @@ class FixWatch:
         if is_used:
             if self._exposure_ns is not None and exposure_ns > self._exposure_ns:
                 self._intervals_s.append((exposure_ns - self._exposure_ns) * 1e-9)
+                self._interval_s = median(self._intervals_s)
             self._used_ns, self._exposure_ns = now_ns, exposure_ns
             self._recent_ns.append(now_ns)
             self._refused = 0
@@ -62,7 +65,7 @@ class FixWatch:
             return
         longest_s = UNKNOWN_OUTAGE_S
         if len(self._intervals_s) >= KNOWN_INTERVALS:
-            longest_s = max(SHORTEST_OUTAGE_S, PERIODS * median(self._intervals_s))
+            longest_s = max(SHORTEST_OUTAGE_S, PERIODS * self._interval_s)
         age_s = (now_ns - self._used_ns) * 1e-9
         if age_s > longest_s:
             yield "star_outage", f"no fix for {age_s:.1f} s"
@@ -74,7 +77,7 @@ class FixWatch:
             self._recent_ns.popleft()
         if len(self._intervals_s) < _INTERVALS:
             return
-        now_hz = 1.0 / median(self._intervals_s)
+        now_hz = 1.0 / self._interval_s
         self._usual_hz += USUAL_GAIN * (now_hz - self._usual_hz) if self._usual_hz else now_hz
         found_hz = len(self._recent_ns) / RARE_OVER_S
         if self._usual_hz >= OFTEN_HZ and found_hz < RARE_SHARE * self._usual_hz:

@@ -5,6 +5,7 @@
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 
 from groundstation.control.vehicle import VehicleModel
 from groundstation.supervision.finding import Finding
@@ -29,7 +30,7 @@ _TURN_KNOWN = 8.0
 """The gyro has a say about thrust not commanded when it would have given this much evidence."""
 _IS_CONSTANT = 0.95
 
-
+_evidence, _unbounded = attrgetter("evidence"), attrgetter("unbounded")
 LEAST_PUSH_M_S = 0.3e-3
 """In a block; less than a valve gives is explained by a clock that is off, and harms nobody."""
 
@@ -250,14 +251,6 @@ class ValveConsistency:
     def _all_weak(self) -> bool:
         weak = [case for case in self._suspicions.cases if case.kind is Kind.WEAK]
         return sum(case.evidence > 0.5 * self.threshold for case in weak) >= max(3, len(weak) // 2)
-
-
-def _evidence(case: Suspicion) -> float:
-    return case.evidence
-
-
-def _unbounded(case: Suspicion) -> float:
-    return case.unbounded
 
 
 def _named(best: Suspicion, rivals: list[Suspicion], all_weak: bool) -> Finding:

@@ -35,6 +35,7 @@ class Kind(Enum):
     LEAK = "leak"
 
 
+_OPEN = Kind.OPEN  # found quickly, for each block
 BY_ITSELF = frozenset((Kind.OPEN, Kind.LEAK))
 """Thrust that was not commanded."""
 
@@ -57,6 +58,7 @@ class Suspicion:
         rate_rad_s: By how much the expected rate would be off now.
         amplitude: Of the block before, as the gyro felt it.
         is_on: Chance that the valve was open in the block before, where it opens by itself.
+        cap: The most that a block adds.
     """
 
     kind: Kind
@@ -73,6 +75,7 @@ class Suspicion:
     rate_rad_s: float = 0.0
     amplitude: float = 0.0
     is_on: float = 0.0
+    cap: float = BLOCK_CAP
 
     def drop(self) -> None:
         """Forget the case."""
@@ -93,7 +96,12 @@ class ValveSuspicions:
         self._fit = fit
         self._halves = [0.5 * size**2 for size in fit.sizes]
         self._of_valve = [
-            tuple(Suspicion(kind, valve) for kind in (Kind.CLOSED, Kind.WEAK, Kind.OPEN, Kind.LEAK))
+            (
+                Suspicion(Kind.CLOSED, valve),
+                Suspicion(Kind.WEAK, valve),
+                Suspicion(Kind.OPEN, valve),
+                Suspicion(Kind.LEAK, valve, cap=LEAK_CAP),
+            )
             for valve in range(len(fit.gains))
         ]
         self.cases = [case for of_valve in self._of_valve for case in of_valve]
@@ -160,17 +168,17 @@ class ValveSuspicions:
             over_healthy: Likewise to the worst valve that is still called healthy.
         """
         amplitude, turning = amplitudes
-        cap = LEAK_CAP if case.kind is Kind.LEAK else BLOCK_CAP
+        cap, rate_variance = case.cap, misfit.rate_variance
         step = 0.5 * self._fit.signatures[case.valve][2] * block.span_s
         idle = case.rate_rad_s + case.amplitude * step
         moved = idle + turning * step
-        by_rate = (misfit.rate_rad_s - 0.5 * moved) * moved / misfit.rate_variance
+        by_rate = (misfit.rate_rad_s - 0.5 * moved) * moved / rate_variance
         whole = by_force + by_rate
         added = min(cap, min(BLOCK_CAP, over_healthy) + by_rate)
         weight = 1.0
-        if case.kind is Kind.OPEN:
+        if case.kind is _OPEN:
             chance = OPENS_CHANCE + (STAYS_CHANCE - OPENS_CHANCE) * case.is_on
-            still = (misfit.rate_rad_s - 0.5 * idle) * idle / misfit.rate_variance
+            still = (misfit.rate_rad_s - 0.5 * idle) * idle / rate_variance
             added, weight = _mixed(min(cap, still), added, chance)
             whole, _ = _mixed(still, whole, chance)
             by_rate = weight * by_rate + (1.0 - weight) * still
@@ -188,7 +196,7 @@ class ValveSuspicions:
             case.residual_y += weight * misfit.force_m_s2[1]
             case.variance += weight * misfit.force_variance
         case.by_rate += by_rate
-        case.turning += 0.5 * moved * moved / misfit.rate_variance
+        case.turning += 0.5 * moved * moved / rate_variance
         case.rate_rad_s = (1.0 - misfit.rate_gain) * moved
         case.amplitude = weight * turning
         case.is_on = weight

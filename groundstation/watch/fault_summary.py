@@ -46,7 +46,8 @@ class FaultSummary:
     def take_delivered(self, delivered: Delivered, now_ns: int) -> None:
         """Account for a message that was never encoded."""
         del now_ns
-        self._account(delivered.payload)
+        if delivered.envelope.topic.noun in _KINDS:
+            self._account(delivered.payload)
 
     def lines(self) -> Iterator[str]:
         """For people; nothing where nothing went wrong."""

@@ -1,12 +1,11 @@
-"""The latency ledger: how old the light and the inertia are at every stage, from envelopes and causes.
+"""The latency ledger: how old the light and the inertia are at every stage, from envelopes and triggers.
 
 Two chains per vehicle. *Light*: middle of the exposure (as the star tracker concluded it), arrival of
 the picture, spots, fix, first state that holds the fix, first wrench from such a state, past the guard,
 CAN frame. *Inertia*: bytes arrived, state published.
 
-The first cause of a message is what triggered it, so the origin of a message (an exposure, an arrival of
-bytes) is that of its first cause. Record streams of several processes come one before the other: a message
-whose first cause is not here yet waits for it.
+The origin of a message (an exposure, an arrival of bytes) is that of its trigger. Record streams of several
+processes come one before the other: a message whose trigger is not here yet waits for it.
 """
 
 import math
@@ -121,7 +120,7 @@ class Ledger:
         noun = recorded.noun
         if noun in _PASSED_ON:
             self._pass_on(
-                Cause(noun, recorded.owner, recorded.sequence), recorded.publish_ns, recorded.causes
+                Cause(noun, recorded.owner, recorded.sequence), recorded.publish_ns, recorded.trigger
             )
         elif noun in _READ:
             key = Cause(noun, recorded.owner, recorded.sequence)
@@ -133,20 +132,19 @@ class Ledger:
                     payload = codec_of(_READ[noun]).decode(recorded.data)
             except CodecError:
                 return  # whoever shows messages counts these
-            self._read(key, recorded.publish_ns, recorded.causes, payload)
+            self._read(key, recorded.publish_ns, recorded.trigger, payload)
 
     def take_delivered(self, delivered: Delivered) -> None:
         """Account for a message that was never encoded, in lockstep."""
         envelope, payload = delivered
-        noun = envelope.topic.noun
-        if noun in FOLLOWED:
-            key = Cause(noun, envelope.owner, envelope.sequence)
-            if noun in _PASSED_ON:
-                self._pass_on(key, envelope.publish_ns, envelope.causes)
-            elif noun in _STAMPED:
-                self._read_stamp(key, envelope.publish_ns, payload.stamp_ns)
-            else:
-                self._read(key, envelope.publish_ns, envelope.causes, payload)
+        topic, owner, sequence, publish_ns, _, trigger = envelope
+        noun = topic.noun
+        if noun in _PASSED_ON:
+            self._pass_on(Cause(noun, owner, sequence), publish_ns, trigger)
+        elif noun in _STAMPED:
+            self._read_stamp(Cause(noun, owner, sequence), publish_ns, payload.stamp_ns)
+        elif noun in _READ:
+            self._read(Cause(noun, owner, sequence), publish_ns, trigger, payload)
 
     def summary(self, vehicle: str, stamp_ns: int) -> Latency:
         """Percentiles of the ages at each stage over the last samples; NaN where there are none."""
@@ -166,26 +164,26 @@ class Ledger:
         else:
             self._learn(key, stamp_ns)
 
-    def _read(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...], payload: Message) -> None:
+    def _read(self, key: Cause, publish_ns: int, trigger: Cause | None, payload: Message) -> None:
         """A message that states something of an origin."""
         if isinstance(payload, StarFix):
             vehicle = self._vehicle(key.owner)
             vehicle.reach("exposure", payload.stamp_ns, payload.stamp_ns)
             if payload.fix:
                 vehicle.reach("fix", payload.stamp_ns, publish_ns)
-            if causes:
-                self._learn(causes[0], payload.stamp_ns)
+            if trigger is not None:
+                self._learn(trigger, payload.stamp_ns)
         elif isinstance(payload, VehicleState):
             if payload.fix_stamp_ns:
                 self._vehicle(key.owner).reach("state", payload.fix_stamp_ns, publish_ns)
             self._learn(key, payload.fix_stamp_ns)
-            if causes:
-                self._await(causes[0], _Link(key, publish_ns))
+            if trigger is not None:
+                self._await(trigger, _Link(key, publish_ns))
 
-    def _pass_on(self, key: Cause, publish_ns: int, causes: tuple[Cause, ...]) -> None:
+    def _pass_on(self, key: Cause, publish_ns: int, trigger: Cause | None) -> None:
         """A message whose origin is that of what triggered it."""
-        if causes and causes[0].noun == _PASSED_ON[key.noun]:
-            self._await(causes[0], _Link(key, publish_ns))
+        if trigger is not None and trigger.noun == _PASSED_ON[key.noun]:
+            self._await(trigger, _Link(key, publish_ns))
 
     def _await(self, cause: Cause, link: _Link) -> None:
         origin_ns = self._origins_ns.get(cause)

@@ -5,10 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from groundstation.bus.envelope import Cause
 from groundstation.declarations.errors import RigError
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.reference.messages import ReferenceState
+from groundstation.recording.causes import CauseIndex
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.reader import Recording
+from groundstation.recording.writer import Recorder
 
 OFFSET_M = (0.6, -0.3)
 FOLLOWER = """
@@ -51,7 +56,7 @@ def pair(fly):
     return fly(follower())
 
 
-def test_each_wrench_of_a_follower_names_its_own_newest_state_first(pair):
+def test_each_wrench_of_a_follower_was_made_from_its_own_newest_state_and_its_leaders(pair, tmp_path):
     newest, found = {}, []
 
     def observe(delivered, _now_ns):
@@ -59,18 +64,20 @@ def test_each_wrench_of_a_follower_names_its_own_newest_state_first(pair):
         if isinstance(delivered.payload, VehicleState):
             newest[envelope.owner] = envelope.sequence
         elif isinstance(delivered.payload, Wrench):
-            found.append((envelope.owner, envelope.causes, dict(newest)))
+            found.append((envelope, dict(newest)))
 
-    pair.runner._observers += (observe,)
-    pair.run(14.0)
-    own = [(owner, causes, states) for owner, causes, states in found if owner == "beta"]
+    path = tmp_path / "formation.mcap"
+    with Recorder(path, RecordingInfo()) as recorder:
+        pair.runner._observers += (observe, recorder.record)
+        pair.run(14.0)
+    own = [(envelope, states) for envelope, states in found if envelope.owner == "beta"]
     assert len(own) > 100
-    for owner, causes, states in own:
-        first = causes[0]
-        assert (first.noun, first.owner, first.sequence) == (VehicleState.TOPIC.noun, owner, states[owner])
-        # the leader's newest state is named as well, once, and not first
-        leaders = [cause.sequence for cause in causes if cause[:2] == (VehicleState.TOPIC.noun, "alpha")]
-        assert leaders == [states["alpha"]]
+    with Recording(path) as recording:
+        journaled = CauseIndex(recording)
+    for envelope, states in own:
+        assert envelope.trigger == Cause(VehicleState.TOPIC.noun, "beta", states["beta"])
+        made_from = [cause for cause in journaled[envelope.as_cause()].causes if cause.noun == "state"]
+        assert sorted(made_from) == [Cause("state", name, states[name]) for name in ("alpha", "beta")]
 
 
 def test_a_follower_reports_the_setpoint_that_it_flies_to(pair):

@@ -8,7 +8,7 @@ from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
 
-IMU_BYTES, IMU, STATE, WRENCH = "imu_bytes", "imu", "state", "wrench"
+IMU_BYTES, IMU, STATE, WRENCH, DEMAND = "imu_bytes", "imu", "state", "wrench", "valve_demand"
 
 
 def recording_with(journal: JournalWriter, tmp_path):
@@ -32,8 +32,11 @@ def index(tmp_path):
         journal.note(Kind.INPUT, "alpha/fusion", IMU, "alpha", number, now_ns)
         journal.note(Kind.OUTPUT, "alpha/fusion", STATE, "alpha", number, now_ns)
         journal.note(Kind.INPUT, "alpha/controller", STATE, "alpha", number, now_ns)
+    journal.note(Kind.INPUT, "alpha/controller", STATE, "bravo", 9, 240)
     journal.note(Kind.TICK, "alpha/controller", "", "lockstep", 0, 250)
     journal.note(Kind.OUTPUT, "alpha/controller", WRENCH, "alpha", 1, 250)
+    journal.note(Kind.INPUT, "alpha/controller", DEMAND, "alpha", 7, 260)
+    journal.note(Kind.OUTPUT, "alpha/controller", WRENCH, "alpha", 2, 260)
     with recording_with(journal, tmp_path) as recording:
         yield CauseIndex(recording)
 
@@ -44,8 +47,14 @@ def test_a_message_said_while_handling_an_input_was_triggered_by_it(index):
     assert (origin.node, origin.given_ns, origin.wall_ns) == ("alpha/imu_reader", 200, 7)
 
 
-def test_a_message_said_in_a_tick_comes_from_the_newest_inputs(index):
-    assert index[Cause(WRENCH, "alpha", 1)].causes == (Cause(STATE, "alpha", 2),)
+def test_a_message_said_in_a_tick_comes_from_the_newest_inputs_of_each_vehicle(index):
+    newest = (Cause(STATE, "alpha", 2), Cause(STATE, "bravo", 9))
+    assert index[Cause(WRENCH, "alpha", 1)].causes == newest
+
+
+def test_an_answer_comes_from_what_it_answers_first_and_then_from_the_newest_other_inputs(index):
+    newest = (Cause(STATE, "alpha", 2), Cause(STATE, "bravo", 9))
+    assert index[Cause(WRENCH, "alpha", 2)].causes == (Cause(DEMAND, "alpha", 7), *newest)
 
 
 def test_the_chain_leads_from_a_command_back_to_the_bytes(index):

@@ -50,10 +50,10 @@ def _zero(ros):
     return 0.0 if ros.startswith("float") else 0
 
 
-def _delivered(payload, sequence=1, publish_ns=0, causes=()):
+def _delivered(payload, sequence=1, publish_ns=0, trigger=None):
     topic = type(payload).TOPIC
     owner = "flight" if topic.scope is Scope.PROCESS else payload.vehicle
-    return Delivered(Envelope(topic, owner, sequence, publish_ns, causes=tuple(causes)), payload)
+    return Delivered(Envelope(topic, owner, sequence, publish_ns, trigger=trigger), payload)
 
 
 def _recorded(one):
@@ -66,8 +66,7 @@ def _recorded(one):
         envelope.sequence,
         envelope.publish_ns,
         0,
-        0,
-        envelope.causes,
+        envelope.trigger,
         data,
     )
 

@@ -18,7 +18,7 @@ MS = 1_000_000
 
 
 class Flight:
-    """Publishes messages at times in ms, with causes, as the runners do."""
+    """Publishes messages at times in ms, with their triggers, as the runners do."""
 
     def __init__(self, message, delivered, cause, vehicle="alpha"):
         self._message, self._delivered, self._cause = message, delivered, cause
@@ -26,14 +26,14 @@ class Flight:
         self._counts = {}
         self.messages = []
 
-    def publish(self, kind, at_ms, *causes, vehicle=None, **fields):
+    def publish(self, kind, at_ms, trigger=None, vehicle=None, **fields):
         """Publish and return what names the message as a cause; times among the fields are ms as well."""
         fields = {
             k.replace("_ms", "_ns"): round(v * MS) if k.endswith("_ms") else v for k, v in fields.items()
         }
         owner = vehicle or self._vehicle
         number = self._counts[kind, owner] = self._counts.get((kind, owner), 0) + 1
-        one = self._delivered(self._message(kind, owner, **fields), number, round(at_ms * MS), causes)
+        one = self._delivered(self._message(kind, owner, **fields), number, round(at_ms * MS), trigger)
         self.messages.append(one)
         return self._cause(one)
 
@@ -41,25 +41,22 @@ class Flight:
         """Bytes that arrived become a sample and a state."""
         read = self.publish(ImuBytes, arrived_ms + 0.1, stamp_ms=arrived_ms, **other)
         sample = self.publish(Imu, arrived_ms + 0.2, read, **other)
-        newest_fix = Cause("star_fix", self._vehicle, 1)
-        return self.publish(VehicleState, at_ms, sample, newest_fix, fix_stamp_ms=exposure_ms, **other)
+        return self.publish(VehicleState, at_ms, sample, fix_stamp_ms=exposure_ms, **other)
 
     def picture(self, arrival_ms, spots_ms, fix_ms, exposure_ms, *, fix=True):
         """A picture becomes spots and the tracker's answer."""
         spots = self.publish(StarSpots, spots_ms, Cause("star_image", "alpha", 1), stamp_ms=arrival_ms)
-        newest_state = Cause("state", "alpha", 1)
-        self.publish(StarFix, fix_ms, spots, newest_state, stamp_ms=exposure_ms, fix=fix)
+        self.publish(StarFix, fix_ms, spots, stamp_ms=exposure_ms, fix=fix)
 
-    def command(self, wrench_ms, guard_ms, bus_ms, state, *others):
+    def command(self, wrench_ms, guard_ms, bus_ms, state):
         """A state becomes a frame on the valve bus; every node has seen other messages, too."""
-        newest_state = Cause("state", self._vehicle, self._counts[VehicleState, self._vehicle])
-        status = self.publish(FusionStatus, wrench_ms - 0.5)
-        wrench = self.publish(Wrench, wrench_ms, state, status, *others)
+        self.publish(FusionStatus, wrench_ms - 0.5)
+        wrench = self.publish(Wrench, wrench_ms, state)
         demand = self.publish(ValveDemand, wrench_ms + 0.5, wrench)
-        chosen = self.publish(ValveSelection, wrench_ms + 1, demand, newest_state, *others)
+        chosen = self.publish(ValveSelection, wrench_ms + 1, demand)
         for late_ms in (0, 20):  # the guard sends what is selected again and again
-            command = self.publish(ValveCommand, guard_ms + late_ms, chosen, Cause("request", "operator", 1))
-            self.publish(CanOut, bus_ms + late_ms, command, Cause("can_in", "", 9))
+            command = self.publish(ValveCommand, guard_ms + late_ms, chosen)
+            self.publish(CanOut, bus_ms + late_ms, command)
 
 
 @pytest.fixture
@@ -71,12 +68,12 @@ def flight(message, delivered, cause):
     flight.picture(1040, 1052, 1063, 1000)
     first = flight.state(1074, 1000, 1072)
     again = flight.state(1084, 1000, 1081.5)
-    beta = flight.state(1085, 1070, 1080, vehicle="beta")
-    flight.command(1095, 1116, 1131, first, beta, before)
-    flight.command(1145, 1166, 1181, again, first)  # the same light once more
+    flight.state(1085, 1070, 1080, vehicle="beta")
+    flight.command(1095, 1116, 1131, first)
+    flight.command(1145, 1166, 1181, again)  # the same light once more
     flight.picture(1142, 1155, 1170, 1100)
     second = flight.state(1184, 1100, 1180)
-    flight.command(1205, 1230, 1250, second, again)
+    flight.command(1205, 1230, 1250, second)
     flight.picture(1246, 1262, 1281, 1200, fix=False)
     return flight.messages
 
@@ -159,9 +156,9 @@ def test_what_no_state_triggered_has_no_age(message, delivered, cause):
     flight = Flight(message, delivered, cause)
     state = flight.state(1010, 1000, 1009)
     request = Cause("request", "operator", 1)
-    stopped = flight.publish(ValveCommand, 1020, request, Cause("valve_selection", "alpha", 1))
+    stopped = flight.publish(ValveCommand, 1020, request)
     flight.publish(CanOut, 1021, stopped)
-    flight.publish(CanOut, 1022, request, state)  # an order to float
+    flight.publish(CanOut, 1022, request)  # an order to float
     flight.publish(CanOut, 1023)
     brake = flight.publish(ValveSelection, 1024, state)  # no demand came, no wrench did
     flight.publish(CanOut, 1026, flight.publish(ValveCommand, 1025, brake))
