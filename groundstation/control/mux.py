@@ -5,8 +5,8 @@ of the controller brakes, for closed valves on a frictionless table mean coastin
 carried on by the model for a while where none comes, so without one all valves close.
 """
 
-import enum
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -15,7 +15,7 @@ Demand = TypeVar("Demand")
 NS_PER_S = 1_000_000_000
 
 
-class Source(enum.Enum):
+class Source(StrEnum):
     """Whose demand goes to the valves."""
 
     BRAKE = "brake"

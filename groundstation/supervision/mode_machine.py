@@ -79,6 +79,10 @@ class ModeMachine:
         """What braking leads to."""
         return self.memory.then
 
+    def counts(self, event: Event) -> bool:
+        """Whether the table has a row for it in this mode: cheaper to ask than a refusal in words."""
+        return transition(self.mode, event) is not None
+
     def recall(self, memory: Memory, now_ns: int) -> None:
         """Take up what was kept on disk before a restart.
 

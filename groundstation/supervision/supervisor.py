@@ -142,7 +142,8 @@ class Supervisor:
         if self.sightings.is_node_silent(now_ns):
             machine.apply(Event.NODE_SILENT, now_ns)
             return
-        machine.apply(Event.NODE_BACK, now_ns)
+        if machine.counts(Event.NODE_BACK):
+            machine.apply(Event.NODE_BACK, now_ns)
         if node is None:
             return
         if not node.floating:
@@ -151,7 +152,11 @@ class Supervisor:
                 machine.apply(Event.AIR_IS_OFF, now_ns)
         elif self._air_since_ns is None:
             self._air_since_ns = now_ns
-        if self._air_since_ns is not None and now_ns - self._air_since_ns >= LIFT_S * 1e9:
+        if (
+            self._air_since_ns is not None
+            and now_ns - self._air_since_ns >= LIFT_S * 1e9
+            and machine.counts(Event.AIR_IS_ON)
+        ):
             machine.apply(Event.AIR_IS_ON, now_ns)
 
     def _respond(self, now_ns: int) -> None:
@@ -159,7 +164,8 @@ class Supervisor:
         worst = self.board.worst()
         machine = self._machine
         if worst is None:
-            machine.apply(Event.FAULTS_GONE, now_ns)
+            if machine.counts(Event.FAULTS_GONE):
+                machine.apply(Event.FAULTS_GONE, now_ns)
             return
         event = _EVENTS[worst.response]
         if self._is_due(event) and not machine.apply(event, now_ns, cause=_words(worst)):
