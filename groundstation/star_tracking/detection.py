@@ -5,14 +5,13 @@ A spot is a group of neighbouring pixels whose smoothed level stands out of the 
 counted; the centres of the others are fitted. All of it is one call of the core (``core/detect.c``).
 """
 
+import mmap
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.core.library import default_core
-
-_ALIGNMENT = 64
 
 
 class PictureError(ValueError):
@@ -141,9 +140,9 @@ class Detector:
     def _make_room(self, rows: int, columns: int) -> None:
         self._settings.max_lit = int(self._max_lit_ratio * rows * columns)
         needed = self._lib.gs_detect_scratch_bytes(rows, columns, self._settings)
-        room = np.empty(needed + _ALIGNMENT, np.uint8)
-        first = -room.ctypes.data % _ALIGNMENT
-        self._scratch = self._ffi.from_buffer("uint8_t[]", room[first : first + needed])
+        # Little of it is ever touched, but NumPy would ask for huge pages, and each touch takes a whole one.
+        room = mmap.mmap(-1, needed, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        self._scratch = self._ffi.from_buffer("uint8_t[]", room)
         self._shape = (rows, columns)
 
 
