@@ -31,7 +31,6 @@ class Envelope(NamedTuple):
         sequence: Counts the publications of one topic of one owner, from 1.
         publish_ns: Host monotonic clock (virtual time in lockstep).
         wall_ns: Wall time the node took over the call that made it, 0 in lockstep.
-        cpu_ns: CPU time of that call, 0 in lockstep.
         trigger: The message that it answers, in a tick the newest of the node's trigger; None where there
             is none.
     """
@@ -41,7 +40,6 @@ class Envelope(NamedTuple):
     sequence: int
     publish_ns: int
     wall_ns: int = 0
-    cpu_ns: int = 0
     trigger: Cause | None = None
 
     def as_cause(self) -> Cause:

@@ -16,9 +16,9 @@ from groundstation.bus.envelope import Cause, Envelope
 
 MAGIC = 0x32535247  # "GRS2"
 _HEAD = struct.Struct("<III")
-_ENTRY = struct.Struct("<qIIIIHHHHI")
-"""publish_ns, sequence, wall_ns, cpu_ns, payload's bytes, indices of noun and owner; of the trigger the
-indices of noun and owner and the sequence."""
+_ENTRY = struct.Struct("<qIIIHHHHI")
+"""publish_ns, sequence, wall_ns, payload's bytes, indices of noun and owner; of the trigger the indices of
+noun and owner and the sequence."""
 _NO_TRIGGER = 0xFFFF
 """In the place of the trigger's noun."""
 _LONGEST_NS = 0xFFFFFFFF
@@ -42,7 +42,7 @@ class RecordWriter:
 
     def add(self, envelope: Envelope, encoded: bytes) -> None:
         """Add one message."""
-        topic, owner, sequence, publish_ns, wall_ns, cpu_ns, trigger = envelope
+        topic, owner, sequence, publish_ns, wall_ns, trigger = envelope
         names = self._names
         trigger_noun, trigger_owner, trigger_sequence = _NO_TRIGGER, 0, 0
         if trigger is not None:
@@ -54,7 +54,6 @@ class RecordWriter:
                 publish_ns,
                 sequence,
                 wall_ns if wall_ns < _LONGEST_NS else _LONGEST_NS,
-                cpu_ns if cpu_ns < _LONGEST_NS else _LONGEST_NS,
                 len(encoded),
                 names.setdefault(topic.noun, len(names)),
                 names.setdefault(owner, len(names)),
@@ -88,7 +87,6 @@ class Recorded(NamedTuple):
         sequence: Of the publication.
         publish_ns: Moment of the publication.
         wall_ns: Wall time that the node took.
-        cpu_ns: CPU time that it took.
         trigger: The message that it answers; None where there is none.
         data: CDR bytes of the payload.
     """
@@ -98,7 +96,6 @@ class Recorded(NamedTuple):
     sequence: int
     publish_ns: int
     wall_ns: int
-    cpu_ns: int
     trigger: Cause | None
     data: bytes
 
@@ -126,7 +123,7 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
         stop = position + entry_count * _ENTRY.size
         rows = list(_ENTRY.iter_unpack(data[position:stop]))
         if (
-            stop + sum([row[4] for row in rows]) != len(data)
+            stop + sum([row[3] for row in rows]) != len(data)
             or len(rows) != entry_count
             or any(_names_nothing(row, name_count) for row in rows)
         ):
@@ -141,7 +138,7 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
 
 def _names_nothing(row: tuple[int, ...], count: int) -> bool:
     """Whether an entry points beyond the ``count`` names of its batch."""
-    _, _, _, _, _, noun, owner, trigger_noun, trigger_owner, _ = row
+    _, _, _, _, noun, owner, trigger_noun, trigger_owner, _ = row
     if noun >= count or owner >= count or trigger_owner >= count:
         return True
     return trigger_noun >= count and trigger_noun != _NO_TRIGGER
@@ -155,13 +152,13 @@ def _messages(
     rows: list[tuple[int, ...]],
 ) -> Iterator[Recorded]:
     made = tuple.__new__  # a third of the time of calling a named tuple
-    for publish_ns, sequence, wall_ns, cpu_ns, size, noun, owner, of_noun, of_owner, at in rows:
+    for publish_ns, sequence, wall_ns, size, noun, owner, of_noun, of_owner, at in rows:
         stop = position + size
         if wanted[noun]:
             trigger = None if of_noun == _NO_TRIGGER else made(Cause, (names[of_noun], names[of_owner], at))
             payload = data[position:stop]
             yield made(
                 Recorded,
-                (names[noun], names[owner], sequence, publish_ns, wall_ns, cpu_ns, trigger, payload),
+                (names[noun], names[owner], sequence, publish_ns, wall_ns, trigger, payload),
             )
         position = stop

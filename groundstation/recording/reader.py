@@ -49,7 +49,7 @@ class Recorded(NamedTuple):
 
     Attributes:
         envelope: Topic, owner, sequence and moment of publication. Wall time and causes are in the journal
-            (``CauseIndex``); CPU time is not recorded.
+            (``CauseIndex``).
         data: CDR bytes of the payload.
         log_ns: Log time.
         decode: Makes the payload of its class by the file's own schema.

@@ -214,7 +214,7 @@ def build_slots(
         journal: Of the process.
         sequences: Of the process.
         name: What the process is called where it runs all nodes.
-        measure: Whether wall and CPU times are measured.
+        measure: Whether wall times are measured.
 
     Raises:
         ValueError: A node refuses its configuration.

@@ -137,7 +137,7 @@ class Ledger:
     def take_delivered(self, delivered: Delivered) -> None:
         """Account for a message that was never encoded, in lockstep."""
         envelope, payload = delivered
-        topic, owner, sequence, publish_ns, _, _, trigger = envelope
+        topic, owner, sequence, publish_ns, _, trigger = envelope
         noun = topic.noun
         if noun in _PASSED_ON:
             self._pass_on(Cause(noun, owner, sequence), publish_ns, trigger)

@@ -66,7 +66,6 @@ def _recorded(one):
         envelope.sequence,
         envelope.publish_ns,
         0,
-        0,
         envelope.trigger,
         data,
     )
