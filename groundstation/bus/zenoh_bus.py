@@ -15,6 +15,7 @@ Latched topics are repeated by their publisher with the same sequence number.
 import json
 import time
 from collections.abc import Callable
+from functools import lru_cache
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -82,6 +83,7 @@ def key_of(topic: Topic, owner: str, *, paced: bool = False) -> str:
     return f"{owner or RIG_OWNER}/{topic.noun}{PACED if paced else ''}"
 
 
+@lru_cache(1024)  # a run has some hundred keys, and each message bears one
 def split_key(key: str) -> tuple[str, str]:
     """Owner and noun of a key."""
     owner, _, noun = key.removesuffix(PACED).rpartition("/")
