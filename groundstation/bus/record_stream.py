@@ -17,10 +17,8 @@ from groundstation.bus.envelope import Cause, Envelope
 MAGIC = 0x32535247  # "GRS2"
 _HEAD = struct.Struct("<III")
 _ENTRY = struct.Struct("<qIIIHHHHI")
-"""publish_ns, sequence, wall_ns, payload's bytes, indices of noun and owner; of the trigger the indices of
-noun and owner and the sequence."""
-_NO_TRIGGER = 0xFFFF
-"""In the place of the trigger's noun."""
+"""publish_ns, sequence, wall_ns, payload's bytes, indices of noun and owner; of the trigger the index of its
+noun plus one (0: there is none), the index of its owner and its sequence."""
 _LONGEST_NS = 0xFFFFFFFF
 
 
@@ -44,9 +42,9 @@ class RecordWriter:
         """Add one message."""
         topic, owner, sequence, publish_ns, wall_ns, trigger = envelope
         names = self._names
-        trigger_noun, trigger_owner, trigger_sequence = _NO_TRIGGER, 0, 0
+        trigger_noun = trigger_owner = trigger_sequence = 0
         if trigger is not None:
-            trigger_noun = names.setdefault(trigger.noun, len(names))
+            trigger_noun = 1 + names.setdefault(trigger.noun, len(names))
             trigger_owner = names.setdefault(trigger.owner, len(names))
             trigger_sequence = trigger.sequence
         self._entries.append(
@@ -125,7 +123,7 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
         if (
             stop + sum([row[3] for row in rows]) != len(data)
             or len(rows) != entry_count
-            or any(_names_nothing(row, name_count) for row in rows)
+            or (rows and not _are_named(rows, name_count))
         ):
             raise BatchError("a batch of the record stream is cut off")
     except (struct.error, ValueError) as error:
@@ -136,12 +134,11 @@ def read_batch(data: bytes, nouns: Container[str] | None = None) -> Iterator[Rec
     return _messages(data, stop, names, wanted, rows)
 
 
-def _names_nothing(row: tuple[int, ...], count: int) -> bool:
-    """Whether an entry points beyond the ``count`` names of its batch."""
-    _, _, _, _, noun, owner, trigger_noun, trigger_owner, _ = row
-    if noun >= count or owner >= count or trigger_owner >= count:
-        return True
-    return trigger_noun >= count and trigger_noun != _NO_TRIGGER
+def _are_named(rows: list[tuple[int, ...]], count: int) -> bool:
+    """Whether all entries point at one of the ``count`` names of their batch."""
+    columns: list[tuple[int, ...]] = list(zip(*rows, strict=True))
+    nouns, owners, trigger_nouns, trigger_owners = columns[4:8]
+    return max(nouns + owners + trigger_owners) < count and max(trigger_nouns) <= count
 
 
 def _messages(
@@ -155,7 +152,7 @@ def _messages(
     for publish_ns, sequence, wall_ns, size, noun, owner, of_noun, of_owner, at in rows:
         stop = position + size
         if wanted[noun]:
-            trigger = None if of_noun == _NO_TRIGGER else made(Cause, (names[of_noun], names[of_owner], at))
+            trigger = made(Cause, (names[of_noun - 1], names[of_owner], at)) if of_noun else None
             payload = data[position:stop]
             yield made(
                 Recorded,
