@@ -7,7 +7,7 @@ vn t + vn |v| / (2 a), with vn the speed towards that edge and t the time until 
 
 import enum
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import ControlState
@@ -23,8 +23,7 @@ class EdgeVerdict(enum.Enum):
     TOO_LATE = "braking ends outside: cut the float air"
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeOutlook:
+class EdgeOutlook(NamedTuple):
     """Prediction for the edge that is met first.
 
     Attributes:

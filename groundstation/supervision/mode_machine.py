@@ -79,10 +79,6 @@ class ModeMachine:
         """What braking leads to."""
         return self.memory.then
 
-    def counts(self, event: Event) -> bool:
-        """Whether the table has a row for it in this mode: cheaper to ask than a refusal in words."""
-        return transition(self.mode, event) is not None
-
     def recall(self, memory: Memory, now_ns: int) -> None:
         """Take up what was kept on disk before a restart.
 
@@ -152,10 +148,18 @@ class ModeMachine:
         )
         return ""
 
+    def happen(self, event: Event, now_ns: int, cause: str = "") -> bool:
+        """Let something happen that the station itself sees or decides; whether it counts in this mode.
+
+        Most of it is tried fifty times a second and counts once in a flight: nobody reads why it does not.
+        """
+        if transition(self.mode, event) is None:
+            return False
+        return not self.apply(event, now_ns, cause=cause)
+
     def _may_fly_on(self, event: Event) -> bool:
         """Whether braking was not begun for something stronger than what the event takes back."""
-        strongest = {Event.RESUME: Then.HOLD, Event.FAULTS_GONE: Then.FLY}.get(event, Then.LAND)
-        return self.then <= strongest
+        return self.memory.then <= _TAKES_BACK.get(event, Then.LAND)
 
     def _grounded(self) -> Mode:
         if self.memory.is_stop_latched:
@@ -199,13 +203,15 @@ class ModeMachine:
         age_s = (now_ns - self.memory.since_ns) * 1e-9
         if self.mode is Mode.BRAKING:
             if is_at_rest:
-                self.apply(Event.AT_REST, now_ns)
+                self.happen(Event.AT_REST, now_ns)
             elif self.then is Then.LAND and age_s >= LONGEST_BRAKING_S:
-                self.apply(Event.HELD, now_ns, cause=f"not at rest after {LONGEST_BRAKING_S:g} s")
+                self.happen(Event.HELD, now_ns, cause=f"not at rest after {LONGEST_BRAKING_S:g} s")
         elif self.mode is Mode.HOLDING and self.then is Then.LAND and age_s >= HOLD_S:
-            self.apply(Event.HELD, now_ns)
+            self.happen(Event.HELD, now_ns)
 
 
+_TAKES_BACK = {Event.RESUME: Then.HOLD, Event.FAULTS_GONE: Then.FLY}
+"""The strongest end of braking that these events take back."""
 _LANDINGS = frozenset({Event.LAND, Event.DISARM, Event.FLOAT_OFF})
 """Of a vehicle that a person has stopped already: who stopped it stays the one to be named."""
 _KEEPS_CAUSE = frozenset(

@@ -229,6 +229,8 @@ class Sightings:
             yield "edge_unavoidable", f"it would stop {-1e3 * outlook.room_m:.0f} mm beyond"
         elif outlook.verdict is not EdgeVerdict.CLEAR:
             yield "edge_ahead", f"it would stop {1e3 * outlook.room_m:.0f} mm before it"
+        if not self.others:
+            return
         first = clearance(
             own.state,
             self.others_here(now_ns),

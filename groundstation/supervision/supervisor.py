@@ -114,11 +114,12 @@ class Supervisor:
         machine, sightings = self._machine, self.sightings
         sightings.look(now_ns, self._period_ns)
         self._follow_node(now_ns)
+        mode = machine.mode
         found = sightings.found(
             now_ns,
-            is_grounded=self.mode in GROUNDED,
-            is_aloft=self.mode in ALOFT,
-            may_open=GUARANTEES[self.mode].may_open,
+            is_grounded=mode in GROUNDED,
+            is_aloft=mode in ALOFT,
+            may_open=GUARANTEES[mode].may_open,
         )
         if self._restarted:
             found[RESTARTED], self._restarted = self._restarted, ""
@@ -129,7 +130,7 @@ class Supervisor:
         if self.mode is Mode.RESTING:
             self._waits_for = self._objections(now_ns, self._override)
             if not self._waits_for:
-                machine.apply(Event.READY, now_ns)
+                machine.happen(Event.READY, now_ns)
         return changed
 
     def _objections(self, now_ns: int, override: str) -> tuple[str, ...]:
@@ -140,35 +141,29 @@ class Supervisor:
         """What the valve node reports of the air, and whether it reports at all."""
         machine, node = self._machine, self.sightings.node
         if self.sightings.is_node_silent(now_ns):
-            machine.apply(Event.NODE_SILENT, now_ns)
+            machine.happen(Event.NODE_SILENT, now_ns)
             return
-        if machine.counts(Event.NODE_BACK):
-            machine.apply(Event.NODE_BACK, now_ns)
+        machine.happen(Event.NODE_BACK, now_ns)
         if node is None:
             return
         if not node.floating:
             was_on, self._air_since_ns = self._air_since_ns is not None, None
             if was_on or self.mode is not Mode.FLOATING:  # there the order may still be on its way
-                machine.apply(Event.AIR_IS_OFF, now_ns)
+                machine.happen(Event.AIR_IS_OFF, now_ns)
         elif self._air_since_ns is None:
             self._air_since_ns = now_ns
-        if (
-            self._air_since_ns is not None
-            and now_ns - self._air_since_ns >= LIFT_S * 1e9
-            and machine.counts(Event.AIR_IS_ON)
-        ):
-            machine.apply(Event.AIR_IS_ON, now_ns)
+        if self._air_since_ns is not None and now_ns - self._air_since_ns >= LIFT_S * 1e9:
+            machine.happen(Event.AIR_IS_ON, now_ns)
 
     def _respond(self, now_ns: int) -> None:
         """Do what the worst fault asks for; what it asked for before it was gone ends with it."""
         worst = self.board.worst()
         machine = self._machine
         if worst is None:
-            if machine.counts(Event.FAULTS_GONE):
-                machine.apply(Event.FAULTS_GONE, now_ns)
+            machine.happen(Event.FAULTS_GONE, now_ns)
             return
         event = _EVENTS[worst.response]
-        if self._is_due(event) and not machine.apply(event, now_ns, cause=_words(worst)):
+        if self._is_due(event) and machine.happen(event, now_ns, _words(worst)):
             self._ground(worst)
 
     def _is_due(self, event: Event) -> bool:
@@ -189,7 +184,7 @@ class Supervisor:
             found = sightings.found(now_ns, is_grounded=False, is_aloft=True, may_open=True)
             hopeless = found.keys() & _HOPELESS
             if hopeless:
-                self._machine.apply(Event.FAULT_CUTS, now_ns, cause=min(hopeless))
+                self._machine.happen(Event.FAULT_CUTS, now_ns, min(hopeless))
 
 
 _HOPELESS = frozenset(
