@@ -158,29 +158,28 @@ class TickClock:
             self._read_ns = arrival_ns
         # A read after a pause holds old frames and new: all teach before the first is stamped.
         self._stamps = []
-        last = frames[-1] if frames else None
+        if not frames:
+            return self._stamps
+        last = frames[-1]
+        last_raw, _ = _raw_tick(last)
         for frame in frames:
             end = start + frame.end_offset
             size = V1_WIRE_BYTES if frame.version == 1 else V2_WIRE_BYTES
             latest_end_ns = arrival_ns - (self._bytes_read - 1 - end) * self._byte_ns
             latest_edge_ns = latest_end_ns - self._send_delay_ns - size * self._byte_ns
-            if last is not None and frame is not last:
-                raw, modulus = _raw_tick(frame)
-                ahead = (_raw_tick(last)[0] - raw) % modulus
+            raw, modulus = _raw_tick(frame)
+            if frame is not last:
+                ahead = (last_raw - raw) % modulus
                 still = start + last.end_offset - end
                 if ahead * size == still * frame.sample_count:  # nothing is missing up to the newest frame
                     after_ns = (self._bytes_read - 1 - start - last.end_offset) * self._byte_ns
                     newest_edge_ns = arrival_ns - after_ns - self._send_delay_ns - size * self._byte_ns
                     latest_edge_ns = min(latest_edge_ns, newest_edge_ns - ahead * TICK_NS)
-            elapsed = self._unwrap(frame, latest_edge_ns, self._silence_ns(end))
+            elapsed = self._unwrap(frame, raw, modulus, latest_edge_ns, self._silence_ns(end))
             self._learn(frame, end, size, latest_end_ns, is_last=frame is last)
             self._taught.append((self._tick, elapsed))
         self._stamp_taught()
         return self._stamps
-
-    def _stamp_taught(self) -> None:
-        self._stamps += [self._slewed(tick, elapsed) for tick, elapsed in self._taught]
-        self._taught = []
 
     # -- one counter --------------------------------------------------------------------------------
 
@@ -195,9 +194,10 @@ class TickClock:
             self._pauses.popleft()
         return longest_ns
 
-    def _unwrap(self, frame: ImuFrame, latest_edge_ns: float, silence_ns: int) -> int | None:
+    def _unwrap(
+        self, frame: ImuFrame, raw: int, modulus: int, latest_edge_ns: float, silence_ns: int
+    ) -> int | None:
         """Advance the unwrapped tick; return the ticks since the last frame, None at a new epoch."""
-        raw, modulus = _raw_tick(frame)
         if not self._is_started:
             self._start(raw, latest_edge_ns)
             return None
@@ -304,32 +304,40 @@ class TickClock:
 
     # -- stamps -------------------------------------------------------------------------------------
 
-    def _slewed(self, tick: int, elapsed: int | None) -> TickStamp:
-        """Move the stamp towards the line no faster than allowed; say how sure it is."""
+    def _stamp_taught(self) -> None:
+        """Stamp the frames that have taught: the line is the same for all of them, and so is its sigma."""
+        if not self._taught:
+            return
         envelope = self._envelope
-        device_ns = float(tick * TICK_NS)
         wait_ns, wait_sigma_ns = self._link.wait(envelope.span_ns, envelope.pause_ns)
-        wanted_ns = self._origin_ns + round(device_ns + envelope.height_ns(device_ns) - wait_ns)
-        stamp_ns = wanted_ns
-        if self._last_stamp_ns is not None:
-            nominal_ns = float((elapsed or 0) * TICK_NS)
-            is_locked = self.is_locked
-            if is_locked and elapsed is not None:
-                nominal_ns *= 1 + envelope.drift
-                stamp_ns = min(stamp_ns, self._last_stamp_ns + math.floor(nominal_ns * (1 + SLEW_LIMIT)))
-            limit = SLEW_LIMIT if is_locked else _UNLOCKED_SLEW_LIMIT
-            earliest_ns = self._last_stamp_ns + max(1, math.ceil(nominal_ns * (1 - limit)))
-            stamp_ns = max(stamp_ns, earliest_ns)
-        self._last_stamp_ns = stamp_ns
         self._widest_wait_ns = max(self._widest_wait_ns, wait_sigma_ns)
         variance_ns2 = (
             wait_sigma_ns**2
             + (SEND_DELAY_STD_S * 1e9) ** 2
-            + self._line_sigma_ns(self._origin_ns + device_ns) ** 2
+            + self._line_sigma_ns(self._origin_ns + float(self._tick * TICK_NS)) ** 2
             + max(envelope.recent_floor_ns, self._doubt_ns) ** 2
         )
-        sigma_s = (math.sqrt(variance_ns2) + abs(stamp_ns - wanted_ns)) * 1e-9
-        return TickStamp(stamp_ns, sigma_s, tick, elapsed, self.epoch)
+        sigma_ns, is_locked = math.sqrt(variance_ns2), self.is_locked
+        for tick, elapsed in self._taught:
+            device_ns = float(tick * TICK_NS)
+            wanted_ns = self._origin_ns + round(device_ns + envelope.height_ns(device_ns) - wait_ns)
+            stamp_ns = self._slewed(wanted_ns, elapsed, is_locked=is_locked)
+            sigma_s = (sigma_ns + abs(stamp_ns - wanted_ns)) * 1e-9
+            self._stamps.append(TickStamp(stamp_ns, sigma_s, tick, elapsed, self.epoch))
+        self._taught = []
+
+    def _slewed(self, wanted_ns: int, elapsed: int | None, *, is_locked: bool) -> int:
+        """Move the stamp towards the line no faster than allowed."""
+        last_ns, stamp_ns = self._last_stamp_ns, wanted_ns
+        if last_ns is not None:
+            nominal_ns = float((elapsed or 0) * TICK_NS)
+            if is_locked and elapsed is not None:
+                nominal_ns *= 1 + self._envelope.drift
+                stamp_ns = min(stamp_ns, last_ns + math.floor(nominal_ns * (1 + SLEW_LIMIT)))
+            limit = SLEW_LIMIT if is_locked else _UNLOCKED_SLEW_LIMIT
+            stamp_ns = max(stamp_ns, last_ns + max(1, math.ceil(nominal_ns * (1 - limit))))
+        self._last_stamp_ns = stamp_ns
+        return stamp_ns
 
     @property
     def _scatter_ns(self) -> float:
