@@ -16,6 +16,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.errors import GroundStationError, RigError, UsageError
 from groundstation.files.errors import FileError
 from groundstation.launch.child import REFUSAL
+from groundstation.launch.forking import give_memory_back
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.urgency import go_first
 from groundstation.recording.policy import ImagePolicy
@@ -102,6 +103,7 @@ def run(orders: Orders) -> None:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()  # what lives for ever need not be looked at again, which costs milliseconds
+    give_memory_back()
     go = wait_for_go()
     if go is None:
         return
