@@ -12,6 +12,7 @@ the chip's axis. Not modelled, being below the codes' steps: g sensitivity of th
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +164,8 @@ class ImuSensors:
         self._gain[0, 0] = GYRO_COUNTS_PER_RAD_S * gyro_scale
         null = self._null + self._null_tempco * warmer_k
         null[0, 0] += GYRO_COUNTS_PER_RAD_S * self._walk_rad_s
-        signal: Array = np.dot(self._gain, np.array(felt).T)
+        polls = np.fromiter(chain.from_iterable(felt), np.float64, 3 * len(felt)).reshape(-1, 3)
+        signal: Array = np.dot(self._gain, polls.T)
         signal += null
         return signal
 
