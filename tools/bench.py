@@ -35,6 +35,7 @@ from bench import (  # noqa: E402
     outage,
     overhead,
     parser,
+    report,
     station_keeping,
     stop,
 )
@@ -67,6 +68,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
         "parser": parser.measure,
+        "report": report.measure,
         "many_mock_ups": many_mock_ups.measure,
         "star": star_frames.measure,
         "star_bound": star_bound.measure,

@@ -27,6 +27,8 @@ _PRIMITIVES = {
     "float32": ("f", 4),
     "float64": ("d", 8),
 }
+_ARRAY_CODES = {"bool": "?", "uint8": "u1", "uint16": "<u2", "uint32": "<u4", "uint64": "<u8", "int64": "<i8"}
+_ARRAY_CODES |= {"float32": "<f4", "float64": "<f8"}
 _LENGTH = struct.Struct("<I")
 _TO_FOUR = (b"", b"\0\0\0", b"\0\0", b"\0")
 _SHORT = 64
@@ -65,10 +67,12 @@ class Run:
     Attributes:
         flat: Gives the numbers of a message, arrays laid open.
         gathered: Gives the fields of unpacked numbers, arrays as tuples.
+        names: Of the fields.
     """
 
     def __init__(self, run: Sequence[_Field]) -> None:
         self._run = run
+        self.names = tuple(field.name for field in run)
         self._structs: dict[int, struct.Struct] = {}
         self.flat: Callable[[Message], Sequence[Any]] = _compiled(
             "message", ("*" * (field.count > 1) + f"message.{field.name}" for field in run)
@@ -84,6 +88,25 @@ class Run:
             layout += "x" * pad + code * field.count
             position += pad + size * field.count
         return layout
+
+    def dtype(self, offset: int) -> np.dtype[np.void]:
+        """The run behind ``offset`` bytes of content, as NumPy reads many of them at once."""
+        formats, offsets, position = [], [], offset & 7
+        for field in self._run:
+            size = _PRIMITIVES[field.base][1]
+            position += -position % size
+            code = _ARRAY_CODES[field.base]
+            formats.append(code if field.count == 1 else f"({field.count},){code}")
+            offsets.append(position - (offset & 7))
+            position += size * field.count
+        return np.dtype(
+            {
+                "names": list(self.names),
+                "formats": formats,
+                "offsets": offsets,
+                "itemsize": position - (offset & 7),
+            }
+        )
 
     def put(self, out: bytearray, message: Message) -> None:
         """Append the fields of a message."""
@@ -124,6 +147,7 @@ class Text:
     """One string."""
 
     def __init__(self, name: str) -> None:
+        self.name = name
         self._get: Callable[[Message], str] = attrgetter(name)
 
     def put(self, out: bytearray, message: Message) -> None:
@@ -141,6 +165,7 @@ class Texts:
     """A sequence of strings."""
 
     def __init__(self, name: str) -> None:
+        self.name = name
         self._get: Callable[[Message], Sequence[str]] = attrgetter(name)
 
     def put(self, out: bytearray, message: Message) -> None:
@@ -165,8 +190,8 @@ class Numbers:
     """A sequence of numbers; bytes and NumPy arrays stay what they are."""
 
     def __init__(self, name: str, base: str) -> None:
-        self._name, self._base = name, base
-        self._code, self._size = _PRIMITIVES[base]
+        self.name, self.base = name, base
+        self._code, self.size = _PRIMITIVES[base]
         self._get: Callable[[Message], Any] = attrgetter(name)
         self._structs: dict[int, struct.Struct] = {}
 
@@ -175,13 +200,13 @@ class Numbers:
         value = self._get(message)
         count = len(value)
         out += _TO_FOUR[len(out) & 3] + _LENGTH.pack(count)
-        if count and self._size == 8 and len(out) & 7 == 0:  # alignment counts from behind the encapsulation
+        if count and self.size == 8 and len(out) & 7 == 0:  # alignment counts from behind the encapsulation
             out += b"\0\0\0\0"
         if isinstance(value, bytes):
             out += value
         elif isinstance(value, np.ndarray):
             if value.dtype.char != self._code:  # hearers in memory would see other numbers than a recording's
-                raise TypeError(f"{self._name}: expected {self._base}, found {value.dtype}")
+                raise TypeError(f"{self.name}: expected {self.base}, found {value.dtype}")
             out += value.astype(value.dtype.newbyteorder("<"), copy=False).tobytes()
         else:
             out += self._layout(count).pack(*value)
@@ -189,14 +214,14 @@ class Numbers:
     def take(self, data: bytes, position: int, values: list[Any]) -> int:
         """Append the numbers found at a position; return the position behind them."""
         count, position = _take_length(data, position)
-        if count and self._size == 8 and position & 7 == 0:
+        if count and self.size == 8 and position & 7 == 0:
             position += 4
-        stop = position + count * self._size
+        stop = position + count * self.size
         if stop > len(data):
             raise ValueError("sequence is cut off")
-        if self._base == "uint8":
+        if self.base == "uint8":
             values.append(data[position:stop])
-        elif self._base == "float32":
+        elif self.base == "float32":
             values.append(np.frombuffer(data, dtype=np.float32, count=count, offset=position))
         else:
             values.append(self._layout(count).unpack_from(data, position))

@@ -20,6 +20,8 @@ from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.files.writing import check_folder
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
+from groundstation.recording.errors import RecordingError
+from groundstation.recording.reader import Recording
 from groundstation.recording.writer import PART_SUFFIX, check_new_recording
 from groundstation.rig.read import parse_rig, read_text
 
@@ -40,7 +42,10 @@ def run(
         typer.Option(help="End by itself after this many seconds.", min=0.1, max=LONGEST_S),
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Write lines instead of a view.")] = False,
-    report: Annotated[Path | None, typer.Option(help="Leave figures and report.json here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Leave report.html and report.json here.")] = None,
+    compare: Annotated[
+        Path | None, typer.Option(help="Recording that --report draws beneath this run.")
+    ] = None,
     record: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="Virtual time, as fast as the CPU allows; needs --duration.")
@@ -65,6 +70,10 @@ def run(
         check_new_recording(record)
     if report is not None:
         check_folder(report)
+    if compare is not None:
+        if report is None:
+            raise UsageError("--compare goes with --report: the recording is drawn in its page")
+        check_recording(compare)
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
     recording = record or loaded.record.directory / f"{stamp}.mcap"
     if lockstep:
@@ -91,11 +100,23 @@ def run(
     if report is not None:
         if not finished:
             raise GroundStationError("there is no report: no recording was finished")
-        from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
+        from groundstation.cli.report import print_report  # only now: a start need not wait for it
 
-        print_report(finished[-1], report)
+        print_report(finished[-1], report, compare=compare)
     if faults.brought_down:
         raise typer.Exit(LANDED_BY_FAULT)
+
+
+def check_recording(path: Path) -> None:
+    """Refuse a recording that cannot be read, before anything moves.
+
+    Raises:
+        UsageError: It says why.
+    """
+    try:
+        Recording(path).close()
+    except RecordingError as error:
+        raise UsageError(str(error)) from error
 
 
 def _say_recordings(recording: Path) -> tuple[list[Path], list[Path]]:

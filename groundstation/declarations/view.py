@@ -5,13 +5,17 @@ A gauge takes messages and answers with a short text; whoever shows it knows not
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, TypeVar
 
+from numpy.typing import NDArray
+
 from groundstation.declarations.message import Message
 
+Array = NDArray[Any]
+Wanted = Mapping[type[Message], tuple[str, ...]]
 RATE_WINDOW_S = 3.0
 M = TypeVar("M", bound=Message)
 
@@ -139,13 +143,25 @@ class Figure(ABC):
 
     Class attributes:
         inputs: Classes of which it takes each recorded message.
+        columns: Classes whose messages come too often for that, and the fields of which it takes arrays.
     """
 
     inputs: ClassVar[tuple[type[Message], ...]] = ()
+    columns: ClassVar[Wanted] = {}
 
-    @abstractmethod
     def take(self, message: Message, t_s: float) -> None:
-        """Account for a message; times count from the start of the recording."""
+        """Account for a message of ``inputs``; times count from the start of the recording."""
+        del message, t_s
+
+    def take_columns(self, kind: type[Message], t_s: Array, fields: Mapping[str, Array]) -> None:
+        """Account for all messages of a class of ``columns``; called once, after the messages.
+
+        Args:
+            kind: The class.
+            t_s: Stamps, ascending; shape (n,).
+            fields: By name, shape (n,) or (n, k); texts as bytes.
+        """
+        del kind, t_s, fields
 
     @abstractmethod
     def values(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ time, so that a recording of any length is read in little memory.
 
 import struct
 from bisect import bisect_left
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Container, Iterator
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -30,8 +30,7 @@ from groundstation.recording.records import (
     MESSAGE,
     RECORD,
     DamagedChunkError,
-    Opcode,
-    complete_records,
+    message_places,
     read_chunk,
 )
 from groundstation.recording.schemas import Decode, decoder_of
@@ -40,7 +39,6 @@ from groundstation.recording.schemas import Decode, decoder_of
 _UNREADABLE = (McapError, EOFError, ValueError, KeyError, OverflowError, OSError, struct.error)
 
 
-_MESSAGE = Opcode.MESSAGE.value
 _log_ns = attrgetter("log_ns")
 
 
@@ -64,6 +62,15 @@ class Recorded(NamedTuple):
     def payload(self) -> Message:
         """The payload, decoded anew at each call; CodecError if the bytes are no such payload."""
         return self.decode(self.data)
+
+
+class Span(NamedTuple):
+    """Messages of one channel in a chunk: class, owner, the file's schema, and where their records begin."""
+
+    kind: type[Message]
+    owner: str
+    schema: str
+    places: list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +201,22 @@ class Recording:
             except CodecError as error:
                 raise RecordingError(f"{self.path}: {error}") from error
 
+    def spans(self, kinds: Collection[type[Message]]) -> Iterator[tuple[bytes, list[Span]]]:
+        """Chunk by chunk the records, and where the messages of each channel of these classes lie in them.
+
+        Raises:
+            RecordingError: A chunk of the file is damaged.
+        """
+        by_noun = {kind.TOPIC.noun: kind for kind in kinds}
+        wanted = {
+            number: (by_noun[noun], owner, schema)
+            for number, (noun, owner, schema) in self._known.items()
+            if noun in by_noun
+        }
+        for index in sorted(self._summary.chunk_indexes, key=attrgetter("message_start_time")):
+            data, places = self._chunk_data(index, wanted)
+            yield data, [Span(*wanted[number], found) for number, found in places.items()]
+
     def close(self) -> None:
         """Close the file."""
         self._file.close()
@@ -226,23 +249,30 @@ class Recording:
         except RecordingError as error:
             raise RecordingError(f"{self.path}: {error}") from error
 
-    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str, Decode]]) -> list[Recorded]:
+    def _chunk_data(self, index: ChunkIndex, wanted: Container[int]) -> tuple[bytes, dict[int, list[int]]]:
+        """The records of a chunk, and where the messages of channels begin in them."""
         try:
-            if index.chunk_start_offset + index.chunk_length > self._size:
+            length = index.chunk_length + index.message_index_length
+            if index.chunk_start_offset + length > self._size:
                 raise DamagedChunkError("a chunk is said to lie behind the end of the file")
             self._file.seek(index.chunk_start_offset + RECORD.size)
             chunk = read_chunk(self._file.read(index.chunk_length - RECORD.size))
             if chunk is None or not chunk.complete:
                 raise DamagedChunkError("a chunk is cut off")
             data = chunk.unpack()
+            indexes = self._file.read(index.message_index_length)
+            return data, message_places(data, indexes if index.message_index_offsets else b"", wanted)
         except DamagedChunkError as error:
             raise RecordingError(f"{self.path}: {error}: try `groundstation recording recover`") from error
-        found = []
-        for opcode, start, stop in complete_records(data):
-            if opcode == _MESSAGE:
-                number, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, start)
-                key = wanted.get(number)
-                if key is not None:
-                    envelope = Envelope(key[0], key[1], sequence, publish_ns)
-                    found.append(Recorded(envelope, data[start + MESSAGE.size : stop], log_ns, key[2]))
-        return found
+
+    def _chunk(self, index: ChunkIndex, wanted: dict[int, tuple[Topic, str, Decode]]) -> list[Recorded]:
+        data, places = self._chunk_data(index, wanted)
+        rows = []
+        for place, number in sorted((place, key) for key, found in places.items() for place in found):
+            topic, owner, decode = wanted[number]
+            start = place + RECORD.size
+            stop = start + RECORD.unpack_from(data, place)[1]
+            _, sequence, log_ns, publish_ns = MESSAGE.unpack_from(data, start)
+            envelope = Envelope(topic, owner, sequence, publish_ns)
+            rows.append(Recorded(envelope, data[start + MESSAGE.size : stop], log_ns, decode))
+        return rows

@@ -6,7 +6,7 @@ strings are prefixed with a u32 length.
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from mmap import mmap
@@ -20,6 +20,8 @@ RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQI")
 _CHANNEL = struct.Struct("<HH")
 MESSAGE = struct.Struct("<HIQQ")
+_INDEX = struct.Struct("<HI")
+_START = struct.Struct("<B8xH")
 _U16 = struct.Struct("<H")
 _U32 = struct.Struct("<I")
 _U64 = struct.Struct("<Q")
@@ -33,6 +35,7 @@ class Opcode(IntEnum):
     CHANNEL = 0x04
     MESSAGE = 0x05
     CHUNK = 0x06
+    MESSAGE_INDEX = 0x07
     CHUNK_INDEX = 0x08
     METADATA = 0x0C
     DATA_END = 0x0F
@@ -40,6 +43,9 @@ class Opcode(IntEnum):
 
 class DamagedChunkError(ValueError):
     """A chunk that cannot be unpacked, or whose checksum is wrong."""
+
+
+_MESSAGE = Opcode.MESSAGE.value
 
 
 class Record(NamedTuple):
@@ -161,6 +167,39 @@ def read_channel(content: bytes) -> Channel:
     number, schema = _CHANNEL.unpack_from(content)
     topic, position = _text(content, _CHANNEL.size)
     return Channel(number, schema, topic, _text(content, position)[0])
+
+
+def message_places(data: bytes, indexes: bytes, wanted: Container[int]) -> dict[int, list[int]]:
+    """Where the message records of each channel begin in the records of a chunk.
+
+    Args:
+        data: The records.
+        indexes: Index records of the chunk, one per channel; empty where there are none.
+        wanted: Numbers of the channels.
+
+    Raises:
+        DamagedChunkError: An index points at something else.
+    """
+    found: dict[int, list[int]] = {}
+    if not indexes:
+        for opcode, start, _ in complete_records(data):
+            if opcode == _MESSAGE:
+                number = MESSAGE.unpack_from(data, start)[0]
+                if number in wanted:
+                    found.setdefault(number, []).append(start - RECORD.size)
+        return found
+    last = len(data) - RECORD.size - MESSAGE.size
+    for _, start, _ in complete_records(indexes):
+        number, size = _INDEX.unpack_from(indexes, start)
+        if number not in wanted:
+            continue
+        places = found[number] = list(
+            struct.unpack_from(f"<{size // 8}Q", indexes, start + _INDEX.size)[1::2]
+        )
+        for place in places:
+            if place > last or _START.unpack_from(data, place) != (_MESSAGE, number):
+                raise DamagedChunkError("the index of a chunk points at no message")
+    return found
 
 
 def read_metadata(content: bytes) -> tuple[str, dict[str, str]]:

@@ -1,4 +1,4 @@
-"""The report of a recording: ``report.json`` and figures that people would rather look at than read."""
+"""The report of a recording: a page for people, and ``report.json`` for programs."""
 
 import json
 import math
@@ -6,52 +6,101 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_folder, whole_folder, write_file
 from groundstation.parts.table import installed_tables
-from groundstation.recording.reader import Recording
-from groundstation.watch.figures import draw_errors, draw_fixes, draw_latency, draw_table, draw_valves
-from groundstation.watch.summary import summarise, wanted
+from groundstation.recording.software import software
+from groundstation.watch.flown_run import FlownRun, read_run
+from groundstation.watch.page.page import render_page
+from groundstation.watch.page.subject import Subject
+from groundstation.watch.run_events import with_verdict
+from groundstation.watch.verdict import Verdict
 
 Progress = Callable[[str, float], None]
 
 
-def write_report(recording: Path, folder: Path, progress: Progress) -> list[Path]:
-    """Read a recording and write figures and ``report.json`` into a folder.
+def write_report(
+    recording: Path,
+    folder: Path,
+    progress: Progress,
+    verdict: Verdict | None = None,
+    compare: Path | None = None,
+) -> list[Path]:
+    """Read a recording and write ``report.html`` and ``report.json`` into a folder.
+
+    Args:
+        recording: Of the run.
+        folder: Made if it is not there.
+        progress: Takes what is being done, and the share that is done.
+        verdict: On the run, where a scenario was flown.
+        compare: Recording of a second run, drawn beneath the first.
 
     Raises:
-        UsageError: The recording holds no vehicle's state.
+        UsageError: A recording holds no vehicle's state.
+        RecordingError: A recording cannot be read.
         FileError: The folder cannot be written.
     """
     check_folder(folder)
-    progress("reading the recording", 0.0)
     tables = installed_tables()
-    with Recording(recording) as source:
-        reports = summarise(tables, source.delivered(wanted(tables)), source.start_ns)
-        duration_s = (source.stop_ns - source.start_ns) * 1e-9
-    if not reports:
-        raise UsageError(f"{recording}: holds no vehicle state, so there is nothing to report")
+    progress("reading the recording", 0.0)
+    run = read_run(recording, tables)
+    other = None
+    if compare is not None:
+        progress(f"reading {compare.name}", 0.2)
+        other = read_run(compare, tables)
+    subject = _subject(run, other, verdict)
+    page = render_page(subject, lambda text, done: progress(text, 0.3 + 0.7 * done))
     folder.parent.mkdir(parents=True, exist_ok=True)
-    tracks = {name: report.track for name, report in reports.items()}
-    figures = {
-        "table.png": draw_table,
-        "errors.png": draw_errors,
-        "valves.png": draw_valves,
-        "fixes.png": draw_fixes,
-        "latency.png": draw_latency,
-    }
-    summary = {
-        "recording": recording.name,
-        "duration_s": duration_s,
-        "vehicles": {name: report.numbers for name, report in reports.items()},
-    }
     with whole_folder(folder) as made:
-        for done, (name, draw) in enumerate(figures.items(), start=1):
-            progress(f"drawing {name}", done / (len(figures) + 1))
-            draw(tracks, made / name)
-        write_file(made / "report.json", json.dumps(_plain(summary), indent=1) + "\n")
+        write_file(made / "report.html", page)
+        write_file(made / "report.json", json.dumps(_plain(_summary(subject)), indent=1) + "\n")
     progress("done", 1.0)
-    return [folder / name for name in ("report.json", *figures)]
+    return [folder / "report.json", folder / "report.html"]
+
+
+def _subject(run: FlownRun, other: FlownRun | None, verdict: Verdict | None) -> Subject:
+    """Lay the runs over each other: both count from when their last vehicle flew, where all did."""
+    marks = with_verdict(run.marks, verdict)
+    other_zero_s = 0.0 if other is None or math.isnan(other.aloft_s) else other.aloft_s
+    if verdict is not None:
+        return Subject(run, verdict.zero_s, "t = 0 of the scenario", marks, verdict, other, other_zero_s)
+    if other is None:
+        return Subject(run, 0.0, "the recording begins", marks)
+    if math.isnan(run.aloft_s) or math.isnan(other.aloft_s):
+        return Subject(run, 0.0, "the recordings begin", marks, None, other, 0.0)
+    return Subject(run, run.aloft_s, "the last vehicle flies", marks, None, other, other_zero_s)
+
+
+def _summary(subject: Subject) -> dict[str, Any]:
+    run, other, verdict = subject.run, subject.other, subject.verdict
+    judged = (
+        {}
+        if verdict is None
+        else {
+            "verdict": verdict.verdict,
+            "reason": verdict.reason,
+            "limits": [outcome.as_json() for outcome in verdict.limits],
+        }
+    )
+    compared = {} if other is None else {"compared": _of_run(other)}
+    return {
+        **judged,
+        **_of_run(run),
+        "events": [mark.as_json(subject.zero_s) for mark in subject.marks],
+        "zero_s": subject.zero_s,
+        "versions": {"recorded_by": run.info.software, "reported_by": software()},
+        **compared,
+    }
+
+
+def _of_run(run: FlownRun) -> dict[str, Any]:
+    return {
+        "recording": run.name,
+        "sha256": run.sha256,
+        "duration_s": run.duration_s,
+        "vehicles": {name: run.numbers(name) for name in run.vehicles},
+        "seed": run.info.seed,
+        "files": dict(run.info.calibration_sha256),
+    }
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 any JSON value

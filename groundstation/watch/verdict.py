@@ -14,7 +14,7 @@ REQUEST: Final = "request"
 FAILURE: Final = "failure"
 FAULT: Final = "fault"
 MODE: Final = "mode"
-MARK: Final = "mark"
+MARKER: Final = "marker"
 READ_FROM_RECORDING: Final = frozenset({REQUEST, FAILURE, FAULT, MODE})
 """Kinds that a report reads from the recording itself; of a verdict it takes events of any other kind."""
 
@@ -89,6 +89,7 @@ class Verdict:
         events: Of kinds that a recording does not hold by itself; in any order.
         zero_s: When the scenario's t = 0 was, s since the recording began.
         title: Of the report; empty for the name of the recording.
+        obstacles: x, y and radius (m, table frame) of each that stands on the table.
     """
 
     verdict: str
@@ -97,3 +98,4 @@ class Verdict:
     events: tuple[RunEvent, ...] = ()
     zero_s: float = 0.0
     title: str = ""
+    obstacles: tuple[tuple[float, float, float], ...] = ()

@@ -9,7 +9,7 @@ from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.rig.read import load_rig, read_text
-from groundstation.watch.summary import summarise, wanted
+from groundstation.watch.summary import read_reports
 
 FLOWN_S = 120.0
 
@@ -53,8 +53,7 @@ def _fly(bench: Bench, condition: Condition, seed: int) -> tuple[float, float]:
 
     run_lockstep(load_rig(rig), read_text(rig), rig, path, FLOWN_S, seed, progress)
     with Recording(path) as recording:
-        tables = installed_tables()
-        reports = summarise(tables, recording.delivered(wanted(tables)), recording.start_ns)
+        reports = read_reports(installed_tables(), recording)
     path.unlink()
     numbers = reports["alpha"].numbers
     return numbers["station_position_rms_mm"], numbers["station_heading_rms_deg"]

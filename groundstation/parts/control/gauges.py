@@ -1,14 +1,15 @@
 """What people are shown of station keeping: the distance to the controller's own setpoint."""
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.declarations.message import Message
 from groundstation.declarations.readings import RecentErrors, column, distance, pose_cell
-from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest
+from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest, Wanted
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.reference.messages import ReferenceState
@@ -73,27 +74,33 @@ class StationGauge(Gauge):
 class StationFigure(Figure):
     """Station keeping by truth, from ``SETTLING_S`` after the vehicle began to fly."""
 
-    inputs = (ReferenceState, ControlStatus, Supervision)
+    inputs = (Supervision,)
+    columns: ClassVar[Wanted] = {
+        ReferenceState: ("position_table_m", "heading_rad"),
+        ControlStatus: ("goal_position_table_m", "goal_heading_rad"),
+    }
 
     def __init__(self) -> None:
-        self._truth: list[tuple[float, ...]] = []
-        self._goal: list[tuple[float, ...]] = []
+        self._truth = self._goal = np.empty((0, 4))
         self._is_flying = False
         self._flying_since_s = math.nan
 
     def take(self, message: Message, t_s: float) -> None:
-        if isinstance(message, ReferenceState):
-            self._truth.append((t_s, *message.position_table_m, message.heading_rad))
-        elif isinstance(message, ControlStatus):
-            self._goal.append((t_s, *message.goal_position_table_m, message.goal_heading_rad))
-        elif isinstance(message, Supervision):
-            was_flying, self._is_flying = self._is_flying, message.is_in_flight
-            if self._is_flying and not was_flying:
-                self._flying_since_s = t_s
+        assert isinstance(message, Supervision)
+        was_flying, self._is_flying = self._is_flying, message.is_in_flight
+        if self._is_flying and not was_flying:
+            self._flying_since_s = t_s
+
+    def take_columns(self, kind: type[Message], t_s: Array, fields: Mapping[str, Array]) -> None:
+        rows = np.column_stack([t_s, *(fields[name] for name in self.columns[kind])])
+        if kind is ReferenceState:
+            self._truth = rows
+        else:
+            self._goal = rows
 
     def values(self) -> dict[str, Any]:
-        truth, goal = (np.array(rows).reshape(-1, 4) for rows in (self._truth, self._goal))
-        t, position_m, heading_rad = station_errors(truth, goal, self._flying_since_s + SETTLING_S).T
+        since_s = self._flying_since_s + SETTLING_S
+        t, position_m, heading_rad = station_errors(self._truth, self._goal, since_s).T
         if not t.size:
             t, position_m, heading_rad = np.zeros(1), np.full(1, np.nan), np.full(1, np.nan)
         return {

@@ -1,10 +1,21 @@
 """What people are shown of an IMU block: rate, losses, a line that is silent or full of noise."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 from groundstation.declarations.message import Message
-from groundstation.declarations.view import NOTHING, Cell, Figure, Gauge, GaugeRow, Level, Newest, cell
+from groundstation.declarations.view import (
+    NOTHING,
+    Array,
+    Cell,
+    Figure,
+    Gauge,
+    GaugeRow,
+    Level,
+    Newest,
+    Wanted,
+    cell,
+)
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.operation.messages import Diagnostics
 
@@ -70,16 +81,15 @@ class ImuGauge(Gauge):
 class ImuFigure(Figure):
     """Frames seen and frames lost."""
 
-    inputs = (Imu,)
+    columns: ClassVar[Wanted] = {Imu: ("frames_lost",)}
 
     def __init__(self) -> None:
         self._frames = self._lost = 0
 
-    def take(self, message: Message, t_s: float) -> None:
-        del t_s
-        assert isinstance(message, Imu)
-        self._frames += 1
-        self._lost = message.frames_lost
+    def take_columns(self, kind: type[Message], t_s: Array, fields: Mapping[str, Array]) -> None:
+        del kind
+        self._frames = len(t_s)
+        self._lost = int(fields["frames_lost"][-1])
 
     def values(self) -> dict[str, Any]:
         return {"imu_frames": self._frames, "imu_frames_lost": self._lost}

@@ -1,14 +1,15 @@
 """What people are shown of the estimate against truth."""
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.declarations.message import Message
 from groundstation.declarations.readings import RecentErrors, column, distance, pose_cell
-from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest
+from groundstation.declarations.view import Cell, Figure, Gauge, GaugeRow, Newest, Wanted
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.supervision.messages import Supervision
@@ -61,26 +62,32 @@ class EstimateGauge(Gauge):
 class EstimateFigure(Figure):
     """The estimate against truth, from ``SETTLING_S`` after the vehicle began to fly."""
 
-    inputs = (ReferenceState, VehicleState, Supervision)
+    inputs = (Supervision,)
+    columns: ClassVar[Wanted] = {
+        ReferenceState: ("position_table_m", "heading_rad"),
+        VehicleState: ("position_table_m", "heading_rad"),
+    }
 
     def __init__(self) -> None:
-        self._truth: list[tuple[float, ...]] = []
-        self._state: list[tuple[float, ...]] = []
+        self._truth = self._state = np.empty((0, 4))
         self._is_flying = False
         self._flying_since_s = math.nan
 
     def take(self, message: Message, t_s: float) -> None:
-        if isinstance(message, ReferenceState):
-            self._truth.append((t_s, *message.position_table_m, message.heading_rad))
-        elif isinstance(message, VehicleState):
-            self._state.append((t_s, *message.position_table_m, message.heading_rad))
-        elif isinstance(message, Supervision):
-            was_flying, self._is_flying = self._is_flying, message.is_in_flight
-            if self._is_flying and not was_flying:
-                self._flying_since_s = t_s
+        assert isinstance(message, Supervision)
+        was_flying, self._is_flying = self._is_flying, message.is_in_flight
+        if self._is_flying and not was_flying:
+            self._flying_since_s = t_s
+
+    def take_columns(self, kind: type[Message], t_s: Array, fields: Mapping[str, Array]) -> None:
+        rows = np.column_stack([t_s, *(fields[name] for name in self.columns[kind])])
+        if kind is ReferenceState:
+            self._truth = rows
+        else:
+            self._state = rows
 
     def values(self) -> dict[str, Any]:
-        truth, state = (np.array(rows).reshape(-1, 4) for rows in (self._truth, self._state))
+        truth, state = self._truth.copy(), self._state
         truth[:, 3] = np.unwrap(truth[:, 3])
         errors = estimate_errors(state[state[:, 0] >= self._flying_since_s + SETTLING_S], truth)
         _, dx, dy, turn = (errors if len(errors) else np.full((1, 4), np.nan)).T

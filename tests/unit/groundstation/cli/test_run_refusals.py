@@ -115,6 +115,9 @@ def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys):
         ([RIGS / "drawn_fixes.toml", "--record", f"{'x' * 250}.mcap"], "File name too long"),
         ([RIGS / "drawn_fixes.toml", "--report", RECORDED / "x"], "no such folder can be made"),
         ([RIGS / "drawn_fixes.toml", "--report", "x" * 300], "File name too long"),
+        ([RIGS / "drawn_fixes.toml", "--compare", RECORDED], "--compare goes with --report"),
+        ([RIGS / "drawn_fixes.toml", "--report", "r", "--compare", "no.mcap"], "no.mcap cannot be opened"),
+        ([RIGS / "drawn_fixes.toml", "--report", "r", "--compare", RIGS / "overhead.toml"], "is no MCAP"),
         ([RIGS], "cannot be read as a rig file"),
     ],
 )  # fmt: skip

@@ -13,16 +13,9 @@ from groundstation.parts.overhead.messages import FixComparison
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand
-from groundstation.watch.figures import (
-    draw_errors,
-    draw_fixes,
-    draw_latency,
-    draw_table,
-    draw_valves,
-    reached_stages,
-)
 from groundstation.watch.ledger import STAGES
-from groundstation.watch.summary import summarise, wanted
+from groundstation.watch.page.latency import reached_stages
+from groundstation.watch.summary import summarise, wanted, wanted_columns
 
 START_NS = 5_000_000_000
 FLYING_S = 2.0
@@ -63,7 +56,7 @@ def flight(message, *, nis):
         there = (1.0 + off_m, 2.002 if off_m < 0.1 else 2.3)
         yield at(VehicleState, t_s, position_table_m=there, heading_rad=heading_rad + turn)
         yield at(Imu, t_s, frames_lost=number // 100)
-        yield at(ValveCommand, t_s, open_mask=number % 256)
+        yield at(ValveCommand, t_s, on_time_ms=bytes([number % 128] * 8))
     for used, reason in ((True, ""), (True, ""), (False, "outside the gate")):
         innovation = (0.003, 0.004, math.radians(0.5))
         yield at(FixAccount, 25.0, used=used, reason=reason, innovation=innovation, nis=nis)
@@ -122,29 +115,17 @@ def test_two_sources_add_their_comparison(report, message):
 def test_only_what_the_report_needs_is_read(tables):
     kinds = wanted(tables)
     assert len(kinds) == len(set(kinds))
-    assert {Imu, FixComparison, Latency, ValveCommand} <= set(kinds)
-    assert Diagnostics not in kinds
-
-
-@pytest.mark.parametrize("nis", [3.0, math.nan])  # the published estimator has none
-@pytest.mark.parametrize("draw", [draw_table, draw_errors, draw_valves, draw_fixes, draw_latency])
-def test_figures_are_drawn_without_a_warning(report, tmp_path, draw, nis):
-    tracks = {name: one.track for name, one in report(nis=nis).items()}
-    draw(tracks, tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize("draw", [draw_table, draw_errors, draw_valves, draw_fixes, draw_latency])
-def test_a_vehicle_of_which_there_is_one_state_is_drawn(tables, message, delivered, tmp_path, draw):
-    reports = summarise(tables, [delivered(message(VehicleState, "alpha", START_NS))], START_NS)
-    draw({name: one.track for name, one in reports.items()}, tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").exists()
+    assert {FixComparison, Latency} <= set(kinds)
+    columns = wanted_columns(tables)
+    assert {Imu, ValveCommand, VehicleState} <= set(columns)
+    assert not set(kinds) & set(columns), "what comes as columns is not decoded once more"
+    assert Diagnostics not in {*kinds, *columns}
 
 
 def test_the_track_is_made_of_its_messages(report):
     track = report()["alpha"].track
-    shapes = (track.truth.shape, track.state.shape, track.goal.shape, track.open_masks.shape)
-    assert shapes == ((301, 4), (301, 7), (1, 4), (301, 2))
+    shapes = (track.truth.shape, track.state.shape, track.goal.shape, track.on_times.shape)
+    assert shapes == ((301, 4), (301, 7), (1, 4), (301, 9))
     assert track.account_reasons == ["", "", "outside the gate"]
     assert np.ptp(track.truth[:, 3]) == 0.0
     assert track.latency is not None
