@@ -62,7 +62,7 @@ def _subject(run: FlownRun, other: FlownRun | None, verdict: Verdict | None) -> 
     marks = with_verdict(run.marks, verdict)
     other_zero_s = 0.0 if other is None or math.isnan(other.aloft_s) else other.aloft_s
     if verdict is not None:
-        return Subject(run, verdict.zero_s, "t = 0 of the scenario", marks, verdict, other, other_zero_s)
+        return Subject(run, verdict.zero_s, "the scenario's time begins", marks, verdict, other, other_zero_s)
     if other is None:
         return Subject(run, 0.0, "the recording begins", marks)
     if math.isnan(run.aloft_s) or math.isnan(other.aloft_s):

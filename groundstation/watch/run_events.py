@@ -148,8 +148,9 @@ def _failed(failure: str, parameters: str) -> str:
 def _in_brackets(given: Any) -> str:  # noqa: ANN401 any JSON value
     if not isinstance(given, dict) or not given:
         return ""
-    words = (
+    words = [
         f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in given.items()
-    )
-    return f" ({', '.join(words)})"
+        if value is not None
+    ]
+    return f" ({', '.join(words)})" if words else ""

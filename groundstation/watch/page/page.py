@@ -77,7 +77,7 @@ def _head(subject: Subject) -> str:
         out.append(f"<p>{badge} {escape(verdict.reason)}</p>\n")
         if verdict.limits:
             out.append(_wide(tables.limits(verdict)))
-    out.append(_note(f"{'; '.join(fact for fact in facts if fact)}. t = 0: {subject.zero_words}."))
+    out.append(_note(f"{'; '.join(fact for fact in facts if fact)}. t = 0 is when {subject.zero_words}."))
     if subject.other is not None:
         out.append(_note(f"Compared with {subject.other.name}: dashed and paler."))
     return "".join(out) + "</header>\n"

@@ -16,6 +16,8 @@ AROUND_M = 0.25
 """Shown beyond the edges of the table."""
 TICK_M = 0.09
 MOST_TICKS = 40
+APART = 13.5
+"""Pixels between the numbers of events."""
 TICK_MOVE_M, TICK_TURN_RAD = 0.04, math.radians(12.0)
 """Less than this since the last heading tick gives no new one."""
 
@@ -127,16 +129,17 @@ class _Plan:
     def _events(self) -> list[str]:
         """Numbers where the vehicle was that something befell."""
         rows_of = {drawn.name: rows for drawn, rows in self._trails if drawn.run is self._subject.run}
-        parts, taken = [], set()
+        parts: list[str] = []
+        taken: list[tuple[float, float]] = []
         for index, mark in enumerate(self._subject.marks, start=1):
             rows = rows_of.get(mark.vehicle)
             if rows is None:
                 continue
             x, y = (float(np.interp(mark.t_s, rows[:, 0], rows[:, axis])) for axis in (1, 2))
             across, down = self._place(x, y)
-            while (round(across / 9), round(down / 9)) in taken:  # beside the one that is there
-                across += 13.0
-            taken.add((round(across / 9), round(down / 9)))
+            while any(math.dist((across, down), place) < APART for place in taken):  # beside what is there
+                across += APART
+            taken.append((across, down))
             parts.append(svg.circle(across, down, 6.5, f"event {mark.kind}"))
             parts.append(svg.text(across, down + 3, str(index), "event-number", "middle"))
         return parts

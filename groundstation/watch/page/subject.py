@@ -45,7 +45,7 @@ class Subject:
     Attributes:
         run: The run.
         zero_s: Where its axis begins to count, s since its recording began.
-        zero_words: What happens at t = 0.
+        zero_words: What happens at t = 0, behind "is when".
         marks: Of the run, in order; numbered from 1.
         verdict: On the run, if there is one.
         other: A run to compare with.

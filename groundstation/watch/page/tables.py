@@ -70,7 +70,9 @@ def numbers(subject: Subject) -> str:
         if any(values.get(key) is not None for _, values in columns)
     ]
     landed = [escape(str(values.get("landed_by_fault") or "\u2013")) for _, values in columns]
-    return table(["", *(drawn.words for drawn, _ in columns)], [*rows, ["landed by a fault", *landed]])
+    return table(
+        ["", *(drawn.words for drawn, _ in columns)], [*rows, ["landed by a fault", *landed]], "numbers"
+    )
 
 
 def fixes(subject: Subject) -> str:
