@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from groundstation.campaign.plan import Plan, columns_of
+from groundstation.campaign.plan import Plan, columns_of, limit_columns
 from groundstation.declarations.calls import described
 from groundstation.declarations.errors import GroundStationError
 from groundstation.rig.read import build_rig, bytes_of, source_of
@@ -79,7 +79,9 @@ def fly_run(package: Package, run: int) -> Row:
     except Exception as error:  # of a controller or part of somebody's own: a row, not the end
         return row | {"verdict": ERROR, "reason": described(error)}
     row |= {"verdict": judged.verdict.verdict, "reason": judged.verdict.reason}
-    return row | {name: written(value.value) for name, value in judged.values.items() if name in row}
+    row |= {name: written(value.value) for name, value in judged.values.items() if name in row}
+    limits = zip(limit_columns(scenario), judged.verdict.limits, strict=True)
+    return row | {column: written(outcome.value) for column, outcome in limits}
 
 
 def died(columns: tuple[str, ...], plan: Plan, run: int) -> Row:

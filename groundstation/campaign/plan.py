@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.campaign.errors import CampaignError
-from groundstation.parts.scenario.part import bounds_of
+from groundstation.scenario.compiling import expanded, groups_of
 from groundstation.scenario.dispersions import Drawn, draw, expanded_keys, laboratory_seed
 from groundstation.scenario.flight_log import FlightLog
 from groundstation.scenario.judging import flown
@@ -15,6 +15,7 @@ from groundstation.scenario.loading import Scenario
 from groundstation.scenario.quantities import QUANTITIES
 
 HEAD = ("run", "seed", "verdict", "reason")
+LIMITS = "limits."
 MOST_RUNS = 1_000_000
 
 
@@ -67,13 +68,26 @@ class Plan:
 
 def columns_of(scenario: Scenario, plan: Plan) -> tuple[str, ...]:
     """Columns of the rows: known before the first run."""
-    return (*HEAD, *plan.keys(scenario), *quantity_columns(scenario))
+    limits = (column for column in limit_columns(scenario) if column.startswith(LIMITS))
+    return (*HEAD, *plan.keys(scenario), *quantity_columns(scenario), *limits)
+
+
+def limit_columns(scenario: Scenario) -> Iterator[str]:
+    """The column of each limit of each vehicle, in the order of a verdict.
+
+    Over the whole run it is that of the quantity, over a part of it one of its own.
+    """
+    groups = groups_of(scenario.rig)
+    for number, limit in enumerate(scenario.file.limits):
+        is_whole = limit.from_s == 0.0 and limit.to_s in (None, scenario.file.duration_s)
+        for vehicles in expanded(limit, number, groups):
+            column = f"{'-'.join(vehicles)}.{limit.what}"
+            yield column if is_whole else f"{LIMITS}{number}.{column}"
 
 
 def quantity_columns(scenario: Scenario) -> Iterator[str]:
     """Columns of the quantities: ``alpha.gas_ns``, ``alpha-beta.least_distance_mm``."""
     nothing = flown(scenario, FlightLog(tuple(scenario.rig.vehicles)))
-    assert nothing.bounds == bounds_of(scenario.rig)
     for vehicle in nothing.tracks:
         for name, row in QUANTITIES.items():
             if not row.is_of_pair and row.applies(nothing, vehicle):

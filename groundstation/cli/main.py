@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 COMMANDS: dict[str, Row] = {
     "run": Command("groundstation.cli.run:app", "Fly the vehicles of a rig, or a scenario."),
+    "campaign": Command("groundstation.cli.campaign:app", "Fly a scenario many times."),
     "replay": Command(
         "groundstation.cli.replay:app", "Feed a recording through the nodes again and compare."
     ),

@@ -19,11 +19,10 @@ from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.scenario.messages import WAITING, Marker, ScenarioStatus
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveCommand
+from groundstation.parts.valves.pulses import open_s
 from groundstation.watch.verdict import RunEvent
 
 Array = NDArray[np.float64]
-COMMAND_MS = 20
-"""The guard commands so often: of an on-time so much is spent before the next command."""
 LOGGED: tuple[type[Message], ...] = (
     ReferenceState, VehicleState, ControlStatus, ValveCommand, Supervision, Faults, Request, Ack,
     InjectedFailure, Marker, ScenarioStatus,
@@ -39,7 +38,7 @@ class VehicleRows:
         truth: Stamp, x, y (m), heading (rad), velocity x, y (m/s), by the reference system.
         state: The same by the estimate, while it is flown on.
         setpoint: Stamp, x, y, heading.
-        open_valves: Stamp, valve seconds that the command opens.
+        commands: Stamp, on-time of each valve (ms).
         goals: Stamp, x, y, heading of each accepted `go_to`; NaN from where a program goes on.
         mode: Of the supervisor, the newest.
         faults: What stands now.
@@ -48,7 +47,7 @@ class VehicleRows:
     truth: list[tuple[float, ...]] = field(default_factory=list)
     state: list[tuple[float, ...]] = field(default_factory=list)
     setpoint: list[tuple[float, ...]] = field(default_factory=list)
-    open_valves: list[tuple[float, ...]] = field(default_factory=list)
+    commands: list[tuple[int, bytes]] = field(default_factory=list)
     goals: list[tuple[float, ...]] = field(default_factory=list)
     mode: str = ""
     faults: frozenset[str] = frozenset()
@@ -105,9 +104,7 @@ class FlightLog:
                 goal = (*message.goal_position_table_m, message.goal_heading_rad)
                 rows.setpoint.append((message.stamp_ns, *goal))
             case ValveCommand():
-                if any(message.on_time_ms):
-                    open_ms = sum(min(on_ms, COMMAND_MS) for on_ms in message.on_time_ms)
-                    rows.open_valves.append((message.stamp_ns, 1e-3 * open_ms))
+                rows.commands.append((message.stamp_ns, bytes(message.on_time_ms)))
             case Supervision():
                 if message.mode != rows.mode:
                     rows.mode = message.mode
@@ -167,7 +164,7 @@ class VehicleTrack:
         truth: t, x, y, heading (unwrapped), velocity x, y; the estimate where there is no reference system.
         state: Likewise, the estimate.
         setpoint: t, x, y, heading.
-        open_valves: t, valve seconds.
+        open_valves: t of each command, seconds that all valves together are open until the next.
         goals: t, x, y, heading.
         has_truth: Whether ``truth`` is one.
     """
@@ -192,7 +189,7 @@ def _track(rows: VehicleRows, zero_ns: int) -> VehicleTrack:
         truth,
         state,
         _array(rows.setpoint, 4, zero_ns),
-        _array(rows.open_valves, 2, zero_ns),
+        _open_valves(rows.commands, zero_ns),
         _array(rows.goals, 4, zero_ns),
         has_truth,
     )
@@ -205,6 +202,15 @@ def _array(rows: list[tuple[float, ...]], columns: int, zero_ns: int) -> Array:
     stamps = np.array([int(row[0]) - zero_ns for row in rows], np.int64)
     values = np.array([row[1:] for row in rows], float).reshape(len(rows), columns - 1)
     return np.column_stack([stamps * 1e-9, values])
+
+
+def _open_valves(commands: list[tuple[int, bytes]], zero_ns: int) -> Array:
+    if not commands:
+        return np.empty((0, 2))
+    t_s = np.array([1e-9 * (stamp_ns - zero_ns) for stamp_ns, _ in commands], np.float64)
+    on_time_ms = np.frombuffer(b"".join(on for _, on in commands), np.uint8).reshape(len(commands), -1)
+    on_time_s = 1e-3 * on_time_ms.astype(np.float64)
+    return np.column_stack([t_s, open_s(t_s, on_time_s).sum(axis=1)])
 
 
 def within(rows: Array, from_s: float, to_s: float) -> Array:

@@ -7,12 +7,24 @@ from typing import Any
 from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.laboratory.messages import InjectedFailure
+from groundstation.parts.scenario.messages import Marker
 from groundstation.parts.supervision.messages import Faults, StopPress, Supervision
 from groundstation.supervision.account import Account
 from groundstation.supervision.modes import ALOFT
-from groundstation.watch.verdict import FAILURE, FAULT, MODE, READ_FROM_RECORDING, REQUEST, RunEvent, Verdict
+from groundstation.watch.verdict import (
+    FAILURE,
+    FAULT,
+    MARKER,
+    MODE,
+    READ_FROM_RECORDING,
+    REQUEST,
+    RunEvent,
+    Verdict,
+)
 
-HEARD: tuple[type[Message], ...] = (Request, Ack, InjectedFailure, Faults, Supervision, StopPress)
+HEARD: tuple[type[Message], ...] = (
+    Request, Ack, InjectedFailure, Faults, Supervision, StopPress, Marker,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +81,8 @@ class EventLog:
                 account.take_faults(t_s, message.ids, message.details, message.responses, there)
             case Supervision():
                 self._mode(message, t_s)
+            case Marker():
+                self._mark(t_s, MARKER, "", message.text)
 
     def marks(self, end_s: float) -> list[Mark]:
         """Everything, in order; what lasted to the end has no end of its own.

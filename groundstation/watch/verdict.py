@@ -15,7 +15,7 @@ FAILURE: Final = "failure"
 FAULT: Final = "fault"
 MODE: Final = "mode"
 MARKER: Final = "marker"
-READ_FROM_RECORDING: Final = frozenset({REQUEST, FAILURE, FAULT, MODE})
+READ_FROM_RECORDING: Final = frozenset({REQUEST, FAILURE, FAULT, MODE, MARKER})
 """Kinds that a report reads from the recording itself; of a verdict it takes events of any other kind."""
 
 
