@@ -24,6 +24,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import cv2  # noqa: E402
 from bench import (  # noqa: E402
+    campaign,
     deaths,
     fault_flights,
     fresh_clone,
@@ -60,6 +61,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
         "stop": stop.measure,
+        "campaign": campaign.measure,
         "deaths": deaths.measure,
         "live_faults": live_faults.measure,
         "outage": outage.measure,
@@ -89,7 +91,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """THE TABLE of subjects, in the order of the page."""
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
-ON_REQUEST = frozenset({"fresh_clone", "fault_flights", "live_faults", "deaths", *FOLDERS})
+ON_REQUEST = frozenset({"campaign", "fresh_clone", "fault_flights", "live_faults", "deaths", *FOLDERS})
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:

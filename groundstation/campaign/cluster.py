@@ -37,7 +37,7 @@ def fly_there(package: Package, runs: Iterable[int], address: str, take: Take) -
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise CampaignError(f"--scheduler {address}: no cluster answers there ({error})") from error
-    with client:
+    with client, client.as_current():
         width = _checked(client, address)
         waiting = deque(runs)
         flying: dict[Any, int] = {}

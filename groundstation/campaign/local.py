@@ -58,8 +58,9 @@ def _flown_until_broken(package: Package, waiting: deque[int], workers: int, tak
     except BrokenProcessPool:
         return _saved(flying, take)
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        _end(pool)
+        if flying:
+            _end(pool)
+        pool.shutdown(wait=True, cancel_futures=True)
     return []
 
 

@@ -9,7 +9,7 @@ from groundstation.campaign.statistics import Array, Driver, LimitRuns, numbers
 from groundstation.watch.page import svg
 from groundstation.watch.page.panel import Scale, round_ticks, tick_word
 
-WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 190.0, 46.0, 34.0
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 430.0, 200.0, 46.0, 20.0, 34.0
 BINS = 30
 
 
@@ -34,9 +34,9 @@ def _x(value: float, span: tuple[float, float]) -> float:
 
 def _axis(span: tuple[float, float], label: str) -> list[str]:
     base = HEIGHT - BOTTOM
-    parts = [svg.rectangle(LEFT, 8.0, WIDTH - LEFT - 8.0, base - 8.0, "frame")]
+    parts = [svg.rectangle(LEFT, TOP, WIDTH - LEFT - 8.0, base - TOP, "frame")]
     for tick in round_ticks(*span, 6):
-        parts.append(svg.line(_x(tick, span), 8.0, _x(tick, span), base, "grid"))
+        parts.append(svg.line(_x(tick, span), TOP, _x(tick, span), base, "grid"))
         parts.append(svg.text(_x(tick, span), base + 13.0, tick_word(tick), "tick", "middle"))
     parts.append(svg.text(WIDTH - 8.0, HEIGHT - 5.0, label, "tick", "end"))
     return parts
@@ -54,15 +54,15 @@ def histogram(limit: LimitRuns) -> str:
     base, most = HEIGHT - BOTTOM, max(int(counts.max()), 1)
     parts = _axis(span, limit.name)
     for count, low, high in zip(counts.tolist(), edges, edges[1:], strict=False):
-        height = (base - 14.0) * count / most
+        height = (base - TOP - 6.0) * count / most
         if count:
             width = max(_x(high, span) - _x(low, span) - 0.8, 0.8)
             parts.append(
                 svg.rectangle(_x(low, span), base - height, width, height, "bar v0", f"{count} runs")
             )
-    parts.append(svg.text(LEFT - 5.0, 18.0, str(most), "tick", "end"))
+    parts.append(svg.text(LEFT - 5.0, TOP + 10.0, str(most), "tick", "end"))
     parts += [
-        svg.line(_x(bound, span), 8.0, _x(bound, span), base, "bound")
+        svg.line(_x(bound, span), TOP, _x(bound, span), base, "bound")
         for bound in _bounds(limit)
         if span[0] <= bound <= span[1]
     ]
@@ -79,18 +79,18 @@ def scatter(driver: Driver, rows: Sequence[Row]) -> str:
     scale = Scale(*up)
     parts = _axis(across, driver.key)
     for tick in scale.ticks():
-        place = base - (base - 8.0) * float(scale.share(tick))
+        place = base - (base - TOP) * float(scale.share(tick))
         parts.append(svg.text(LEFT - 5.0, place + 3.5, tick_word(tick), "tick", "end"))
     for held, kind in ((True, "v0"), (False, "broken")):
         chosen = limit.held[known] == held
         ways = [
-            f"M{svg.number(_x(here, across))} {svg.number(base - (base - 8.0) * float(scale.share(there)))}h0"
+            f"M{svg.number(_x(here, across))} {svg.number(base - (base - TOP) * float(scale.share(there)))}h0"
             for here, there in zip(x[chosen].tolist(), y[chosen].tolist(), strict=True)
         ]
         parts.append(svg.path("".join(ways), f"dots {kind}"))
     for bound in _bounds(limit):
         if up[0] <= bound <= up[1]:
-            place = base - (base - 8.0) * float(scale.share(bound))
+            place = base - (base - TOP) * float(scale.share(bound))
             parts.append(svg.line(LEFT, place, WIDTH - 8.0, place, "bound"))
-    parts.append(svg.text(LEFT + 6.0, 20.0, f"{limit.name}, r = {driver.correlation:.2f}", "legend"))
+    parts.append(svg.text(LEFT, TOP - 6.0, f"{limit.name}, r = {driver.correlation:.2f}", "legend"))
     return svg.picture(parts, WIDTH, HEIGHT, f"{limit.name} against {driver.key}")

@@ -1,0 +1,117 @@
+"""Rows on disk: in order, whole after any crash, none missing, none twice."""
+
+import csv
+import json
+
+import pytest
+
+from groundstation.campaign.errors import CampaignError
+from groundstation.campaign.rows import CSV, STATED, WAITING, Rows
+
+COLUMNS = ("run", "seed", "verdict", "reason", "alpha.gas_ns")
+IDENTITY = {"seed": 1}
+
+
+def row(run, reason=""):
+    return {
+        "run": str(run), "seed": str(run * 7), "verdict": "passed", "reason": reason,
+        "alpha.gas_ns": f"{run / 3:.9g}",
+    }  # fmt: skip
+
+
+def opened(folder, *, resume=False, columns=COLUMNS, identity=None):
+    return Rows(folder, columns, IDENTITY if identity is None else identity, resume=resume)
+
+
+def read(folder):
+    with (folder / CSV).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_stand_in_order_whatever_the_order_in_which_they_come(tmp_path):
+    with opened(tmp_path) as rows:
+        for run in (2, 0, 3, 1, 4):
+            rows.add(run, row(run))
+    assert [each["run"] for each in read(tmp_path)] == ["0", "1", "2", "3", "4"]
+    assert read(tmp_path) == [row(run) for run in range(5)]
+    assert not (tmp_path / WAITING).exists()
+
+
+def test_what_comes_early_is_on_disk_at_once(tmp_path):
+    with opened(tmp_path) as rows:
+        rows.add(2, row(2))
+        assert [json.loads(line)["run"] for line in (tmp_path / WAITING).read_text().splitlines()] == ["2"]
+        assert read(tmp_path) == []
+
+
+@pytest.mark.parametrize("reason", ["a, b", 'he said "no"', "two\nlines", "ä µ"])
+def test_a_reason_is_one_cell_whatever_is_in_it(tmp_path, reason):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0, reason))
+        rows.add(1, row(1))
+    assert read(tmp_path) == [row(0, reason), row(1)]
+    with opened(tmp_path, resume=True) as rows:
+        assert rows.done == {0, 1}
+
+
+def test_cut_at_any_byte_it_goes_on_and_is_as_if_it_had_never_been_cut(tmp_path):
+    whole = tmp_path / "whole"
+    with opened(whole) as rows:
+        for run in range(4):
+            rows.add(run, row(run, "a\nb" if run == 1 else ""))
+    text = (whole / CSV).read_bytes()
+    for cut in range(len(text)):
+        folder = tmp_path / f"cut{cut}"
+        folder.mkdir()
+        (folder / STATED).write_text((whole / STATED).read_text())
+        (folder / CSV).write_bytes(text[:cut])
+        with opened(folder, resume=True) as rows:
+            for run in set(range(4)) - rows.done:
+                rows.add(run, row(run, "a\nb" if run == 1 else ""))
+        assert (folder / CSV).read_bytes() == text, cut
+
+
+def test_a_journal_that_is_cut_anywhere_loses_only_its_last_line(tmp_path):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0))
+        for run in (2, 3, 4):
+            rows.add(run, row(run))
+    journal = (tmp_path / WAITING).read_bytes()
+    (tmp_path / WAITING).write_bytes(journal[:-5])
+    with opened(tmp_path, resume=True) as rows:
+        assert rows.done == {0, 2, 3}
+        rows.add(1, row(1))
+        rows.add(4, row(4))
+        assert rows.done == set(range(5))
+    assert read(tmp_path) == [row(run) for run in range(5)]
+
+
+def test_a_row_that_comes_twice_counts_once(tmp_path):
+    with opened(tmp_path) as rows:
+        for run in (0, 0, 2, 2, 1, 0):
+            rows.add(run, row(run))
+    assert read(tmp_path) == [row(run) for run in range(3)]
+
+
+def test_a_folder_with_a_campaign_is_not_begun_again(tmp_path):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0))
+    before = (tmp_path / CSV).read_bytes()
+    with pytest.raises(CampaignError, match="--resume goes on with it"):
+        opened(tmp_path)
+    with pytest.raises(CampaignError, match="another campaign"):
+        opened(tmp_path, resume=True, identity={"seed": 2})
+    assert (tmp_path / CSV).read_bytes() == before
+
+
+def test_rows_that_nobody_accounts_for_are_left_alone(tmp_path):
+    (tmp_path / CSV).write_text("mine\n")
+    with pytest.raises(CampaignError, match="does not say of what"):
+        opened(tmp_path, resume=True)
+    assert (tmp_path / CSV).read_text() == "mine\n"
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CampaignError, match="cannot be written"):
+        opened(tmp_path / "file")
