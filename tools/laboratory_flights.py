@@ -30,7 +30,7 @@ valve_bus = "laboratory:valve_bus"
 table = { x_min_m = -2.0, x_max_m = 2.0, y_min_m = -1.5, y_max_m = 1.5 }
 
 [mock_ups.standard]
-valves = { open_delay_s = OPEN, close_delay_s = CLOSE, min_on_s = LEAST }
+valves = { open_delay_s = OPEN, close_delay_s = CLOSE, rise_s = RISE, min_on_s = LEAST }
 
 [mock_ups.standard.imu]
 baud = 250000
@@ -113,9 +113,10 @@ def drawn(seed: int) -> Hidden:
 def station(hidden: Hidden, seed: int) -> str:
     """The rig's tables without the laboratory."""
     rng = np.random.default_rng([seed, 13])
-    off_s = rng.uniform(-DELAY_OFF_S, DELAY_OFF_S, 2).tolist()
+    off_s = rng.uniform(-DELAY_OFF_S, DELAY_OFF_S, 3).tolist()
     open_s, close_s = hidden.open_delay_s + off_s[0], hidden.close_delay_s + off_s[1]
     text = STATION.replace("OPEN", f"{open_s:.4f}").replace("CLOSE", f"{close_s:.4f}")
+    text = text.replace("RISE", f"{hidden.rise_s + off_s[2]:.4f}")
     return text.replace("LEAST", f"{open_s + LEAST_OPEN_S:.3f}")
 
 

@@ -20,6 +20,8 @@ from drivers.valve_bus.messages import VALVES
 Array = NDArray[np.float64]
 
 POLL_S = 1e-3
+CLOSING_DOUBT_S = 2e-4
+"""A valve that is energised so near the moment of its closing may have stayed open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +68,14 @@ class Openings:
         valve: (p,) whose.
         begin, end: (p,) fractional polls.
         is_doubtful: (p,) whether the pulse was so short that it may not have opened at all.
+        doubtful_spans: From and to, when nobody knows whether a valve was open.
     """
 
     valve: NDArray[np.intp]
     begin: Array
     end: Array
     is_doubtful: NDArray[np.bool_]
+    doubtful_spans: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,32 +101,34 @@ def openings(coils: CoilSpans, start: Array, stop: Array, timing: Timing, doubt_
         timing: Of the valves.
         doubt_s: A coil energised for the delay of opening give or take this may not have opened its valve.
     """
-    valve: list[int] = []
-    begin: list[float] = []
-    end: list[float] = []
-    doubtful: list[bool] = []
-    for each in range(VALVES):
-        rows = np.flatnonzero(coils.valve == each)
+    found: list[tuple[int, float, float, bool]] = []
+    spans: list[tuple[float, float]] = []
+    margin, opens, closes = doubt_s / POLL_S, timing.open_s / POLL_S, timing.close_s / POLL_S
+    for valve in range(VALVES):
+        rows = np.flatnonzero(coils.valve == valve)
         open_until = -math.inf
         for first, last in zip(start[rows].tolist(), stop[rows].tolist(), strict=True):
-            closed = last + timing.close_s / POLL_S
+            if abs(first - open_until) < CLOSING_DOUBT_S / POLL_S:
+                spans.append((min(first, open_until), max(last, first + opens) + closes))
             if first < open_until:  # it was still open
-                end[-1] = open_until = closed
+                open_until = last + closes
+                found[-1] = (valve, found[-1][1], open_until, found[-1][3])
                 continue
-            opened, margin = first + timing.open_s / POLL_S, doubt_s / POLL_S
+            opened = first + opens
             if last < opened - margin:
                 continue
-            valve.append(each)
-            begin.append(opened)
-            end.append(max(closed, opened))
-            doubtful.append(last < opened + margin)
-            open_until = closed if last > opened else -math.inf
-    order = np.argsort(begin, kind="stable")
+            is_doubtful = last < opened + margin
+            found.append((valve, opened, max(last + closes, opened), is_doubtful))
+            if is_doubtful:
+                spans.append((opened, found[-1][2]))
+            open_until = last + closes if last > opened else -math.inf
+    found.sort(key=lambda row: row[1])
     return Openings(
-        np.array(valve, dtype=np.intp)[order],
-        np.array(begin, dtype=np.float64)[order],
-        np.array(end, dtype=np.float64)[order],
-        np.array(doubtful, dtype=np.bool_)[order],
+        np.array([row[0] for row in found], dtype=np.intp),
+        np.array([row[1] for row in found], dtype=np.float64),
+        np.array([row[2] for row in found], dtype=np.float64),
+        np.array([row[3] for row in found], dtype=np.bool_),
+        tuple(spans),
     )
 
 

@@ -138,7 +138,12 @@ class ValveEquations:
         return rest, turned - turned[: max(1, round(START_S / POLL_S / self.flight.windows.polls))].mean()
 
     def columns(
-        self, value: Array, jitter_s: float, shares: tuple[Array, Array], plain: tuple[Array, Array]
+        self,
+        value: Array,
+        jitter_s: float,
+        opened: Openings,
+        shares: tuple[Array, Array],
+        plain: tuple[Array, Array],
     ) -> tuple[Array, ...]:
         """Derivatives (n, 26) of force x, force y and rate by the core."""
         share, turned = shares
@@ -154,8 +159,14 @@ class ValveEquations:
         rate[:, TURN_DRAG] = -self.motion.heading_rad
         names = ("open_s", "close_s", "rise_s", "sag")
         for place, (name, step) in enumerate(zip(names, TIMING_STEPS, strict=True), OPEN):
+            # which valve opened is taken as it is: only its edges move
+            edges = replace(
+                opened,
+                begin=opened.begin + (step / POLL_S if place == OPEN else 0.0),
+                end=opened.end + (step / POLL_S if place == CLOSE else 0.0),
+            )
             other = replace(timing, **{name: value[place] + step})
-            moved = self.predicted(value, self.shares(other, jitter_s))
+            moved = self.predicted(value, self.shares(other, jitter_s, edges))
             x[:, place], y[:, place] = ((moved[0] - plain[0]) / step).T
             rate[:, place] = (moved[1] - plain[1]) / step
         return x, y, rate
@@ -193,9 +204,9 @@ class ValveEquations:
     def hidden_by(self, opened: Openings) -> NDArray[np.bool_]:
         """(n,) what doubtful openings may have pushed."""
         hidden = np.zeros(self.n, dtype=np.bool_)
-        for row in np.flatnonzero(opened.is_doubtful):
-            stop = min(self.flight.polls, int(opened.end[row] + SETTLE_S / POLL_S))
-            rows = self._row_of_poll[max(0, int(opened.begin[row])) : stop]
+        for start, stop in opened.doubtful_spans:
+            last = min(self.flight.polls, int(stop + SETTLE_S / POLL_S))
+            rows = self._row_of_poll[max(0, int(start)) : max(0, last)]
             hidden[rows[rows >= 0]] = True
         return hidden
 

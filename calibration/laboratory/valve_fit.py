@@ -250,7 +250,7 @@ def _step(
     used = equations.clean & ~equations.hidden_by(opened)
     shares = equations.shares(timing, spreads.jitter_s, opened)
     force, rate = equations.predicted(value, shares)
-    x, y, turn = equations.columns(value, spreads.jitter_s, shares, (force, rate))
+    x, y, turn = equations.columns(value, spreads.jitter_s, opened, shares, (force, rate))
     hats, knots = equations.hats, equations.hats.shape[1]
     force_left = flight.force_m_s2 - force
     rate_left = reading.rate_rad_s - rate
