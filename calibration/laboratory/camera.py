@@ -109,6 +109,9 @@ def camera_of(
     except CalibrationRefusedError as error:
         unseen["camera.delay_s"] = str(error)
     for key, columns in (("camera.sigma_xy_m", (0, 1)), ("camera.sigma_heading_rad", (2,))):
+        if len(flight.fix_arrival_ns) == 0:
+            unseen[key] = "fixes came from another source"
+            continue
         noise = _noise(motion, columns, jitter_s)
         if isinstance(noise, str):
             unseen[key] = noise

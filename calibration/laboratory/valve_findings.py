@@ -164,8 +164,13 @@ def _timing(fit: ValveFit) -> Findings:
         ("valves.sag", SAG, LEARNED * SAG_SIGMA, "1"),
     )
     for key, place, limit, unit in rows:
-        if sigma[place] < limit:
-            found[key] = Found(float(fit.value[place]), float(sigma[place]), unit)
+        value = float(fit.value[place])
+        if value < 0.0:
+            unseen[key] = (
+                f"comes out at {value:.2g} {unit}: the stamps of IMU and commands are not of one clock"
+            )
+        elif sigma[place] < limit:
+            found[key] = Found(value, float(sigma[place]), unit)
         else:
             unseen[key] = f"the flight tells it to {sigma[place]:.2g} {unit} only"
     jitter, key = fit.spreads.jitter_s, "valves.open_delay_sd_s"

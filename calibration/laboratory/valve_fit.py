@@ -45,9 +45,13 @@ from groundstation.cli.progress import Progress
 Array = NDArray[np.float64]
 
 MOST_STEPS, SETTLED_STEPS = 40, 3
-LARGEST_STEP_S, SETTLED_S = 4e-3, 2e-6
+LARGEST_STEP_S, SETTLED_S, SETTLED_SIGMAS = 4e-3, 1e-6, 0.05
+DAMPED_AFTER = 15
+"""Steps that have not settled by then go to and fro."""
 OUTLIER_SIGMAS = 6.0
 LEAST_RISE_S = 2e-4
+EARLIEST_S = -0.02
+"""A delay below zero states that the stamps are off; it is searched for, and not believed."""
 LEAST_SAG, MOST_SAG = 0.5, 1.1
 FIRST_JITTER_S, LEAST_JITTER_S = 5e-4, 1e-5
 FIRST_FORCE_M_S2, FIRST_RATE_RAD_S = 1e-3, 1e-3
@@ -165,9 +169,11 @@ def fit_valves(flight: RecordedFlight, model: ValveModel, motion: Motion, progre
     settled, is_cleaned = 0, False
     for number in range(MOST_STEPS):
         progress("fitting the valves", number / MOST_STEPS)
-        excess = max(1.0, float(np.abs(found.change[OPEN:SAG]).max()) / LARGEST_STEP_S)
+        moved = np.abs(found.change[OPEN:SAG])
+        excess = max(1.0, float(moved.max()) / LARGEST_STEP_S, 2.0 * (number > DAMPED_AFTER))
         value = _bounded(value + found.change / excess)
-        settled = settled + 1 if np.abs(found.change[OPEN:SAG]).max() < SETTLED_S else 0
+        near = np.maximum(SETTLED_S, SETTLED_SIGMAS * np.sqrt(found.covariance.diagonal()[OPEN:SAG]))
+        settled = settled + 1 if (moved < near).all() else 0
         if settled >= SETTLED_STEPS:
             if is_cleaned:
                 break
@@ -234,7 +240,7 @@ def _prior(model: ValveModel) -> Array:
 
 def _bounded(value: Array) -> Array:
     value = value.copy()
-    value[[OPEN, CLOSE]] = np.maximum(0.0, value[[OPEN, CLOSE]])
+    value[[OPEN, CLOSE]] = np.maximum(EARLIEST_S, value[[OPEN, CLOSE]])
     value[RISE] = max(LEAST_RISE_S, value[RISE])
     value[SAG] = min(MOST_SAG, max(LEAST_SAG, value[SAG]))
     return value
