@@ -147,7 +147,9 @@ def _of_vehicle(
     kind, model = rig.type_of(flight.vehicle), model_of(rig, flight.vehicle)
     force_x, force_y, torque = kind.model().effectiveness()
     pushes = pushes_of(fit, model, matrix, motion.gyro_scale)
-    found = valve_findings(fit, model, pushes, kind.mass_kg, torque / np.hypot(force_x, force_y))
+    found = valve_findings(
+        fit, pushes, kind.mass_kg, torque / np.hypot(force_x, force_y), flight.link_sigma_s
+    )
     inertia = found.found.get("inertia_kg_m2")
     found += drag_findings(fit, kind.mass_kg, kind.inertia_kg_m2 if inertia is None else inertia.value)
     found += noise_findings(fit, flight, model)
@@ -159,7 +161,6 @@ def _of_vehicle(
         assumed=(
             f"mass_kg = {kind.mass_kg:g}: of a push only force over mass and torque over inertia are seen",
             "where valves sit and push, and where the IMU sits, as the rig states",
-            "the IMU's link as the rig states (ftdi_latency_s), 0.5 ms from a poll to its frame: if they are "
-            "otherwise, both delays of the valves and the camera's are off by as much",
+            "the timer of the IMU's adapter as the rig states (ftdi_latency_s); frames leave 0.5 ms late",
         ),
     )

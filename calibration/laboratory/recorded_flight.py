@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,8 @@ from calibration.laboratory.coil_spans import CoilSpans, coil_spans
 from calibration.laboratory.thrust_course import POLL_S, Windows
 from calibration.outcome import CalibrationRefusedError
 from groundstation.declarations.rig import Rig
-from groundstation.parts.imu.messages import Imu
+from groundstation.parts.imu.messages import Imu, ImuBytes
+from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.messages import FixBytes, StarFix
 from groundstation.parts.valves.messages import CanOut, ValveStatus
 from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
@@ -26,6 +28,7 @@ LIFTED_S = 0.6
 """So long after the air is on the vehicle surely floats; a touch of the floor is no force of a valve."""
 SHORTEST_S = 5.0
 CLOCK_SMOOTHING_S = 10.0
+LINK_LOOKED_AT_NS = 2_000_000_000
 _ALL_USABLE = 7
 _NS = 1e-9
 
@@ -40,6 +43,7 @@ class RecordedFlight:
         rate_rad_s: (n,) as measured.
         force_m_s2: (n, 2) as measured.
         stamp_ns: (n,) end of each window, host time, by the line through all stamps.
+        link_sigma_s: What the IMU's link leaves unknown of all stamps alike.
         polls: Length of the course.
         coils: Of its valves.
         coil_start, coil_stop: (p,) their spans in polls.
@@ -54,6 +58,7 @@ class RecordedFlight:
     rate_rad_s: Array
     force_m_s2: Array
     stamp_ns: Array
+    link_sigma_s: float
     polls: int
     coils: CoilSpans
     coil_start: Array
@@ -122,6 +127,7 @@ def read_flight(recording: Recording, rig: Rig, vehicle: str, camera_delay_s: fl
         rate_rad_s=imu[rows, 4],
         force_m_s2=imu[rows, 5:7],
         stamp_ns=stamp_ns[rows],
+        link_sigma_s=_link_sigma_s(recording, rig, vehicle, round(stamp_ns[rows[0]]), size * POLL_S),
         polls=int(last[-1]) + 1,
         coils=coils,
         coil_start=in_polls(coils.start_ns),
@@ -177,6 +183,30 @@ def _clock(stamp_ns: Array, tick: Array, sigma_s: Array) -> tuple[Array, float]:
     off = np.interp(tick, tick[sure], (stamp_ns - stamp_ns[0] - line)[sure])
     size = max(1, round(CLOCK_SMOOTHING_S * 1e3 / float(np.median(np.diff(tick)))))
     return stamp_ns[0] + line + uniform_filter1d(off, size, mode="nearest"), float(slope)
+
+
+def _link_sigma_s(recording: Recording, rig: Rig, vehicle: str, from_ns: int, period_s: float) -> float:
+    """Return the sigma of how long the last byte of a read has waited in the adapter.
+
+    The clock takes it for the timer less the packet; a timer that runs from the packet before lets it wait
+    for less (docs/interfaces/imu_block.md, 1).
+    """
+    imu = rig.of_type(vehicle, ImuOfType).imu
+    sizes: list[int] = []
+    timer_s = imu.ftdi_latency_s
+    for message in recording.messages((ImuBytes,), (vehicle,), from_ns, from_ns + LINK_LOOKED_AT_NS):
+        payload = message.payload
+        assert isinstance(payload, ImuBytes)
+        sizes.append(len(payload.data))
+        timer_s = payload.latency_timer_s if np.isfinite(payload.latency_timer_s) else timer_s
+    if not sizes:
+        return timer_s / math.sqrt(3.0)
+    byte_s = 10.0 / imu.baud
+    frame_bytes = sum(sizes) * period_s / (LINK_LOOKED_AT_NS * 1e-9)
+    frames = max(1.0, float(np.median(sizes)) / frame_bytes)
+    span_s = (frames - 1.0) * period_s + frame_bytes * byte_s
+    pause_s = max(0.0, period_s - frame_bytes * byte_s)
+    return min(max(0.0, timer_s - span_s), pause_s) / math.sqrt(3.0)
 
 
 def _pictures_of(

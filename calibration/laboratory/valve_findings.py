@@ -97,15 +97,17 @@ def pushes_of(
     return Pushes(value, covariance)
 
 
-def valve_findings(fit: ValveFit, model: ValveModel, pushes: Pushes, mass_kg: float, arms: Array) -> Findings:
+def valve_findings(
+    fit: ValveFit, pushes: Pushes, mass_kg: float, arms: Array, link_sigma_s: float
+) -> Findings:
     """Return thrusts, inertia and timing.
 
     Args:
         fit: The fit.
-        model: Of the rig.
         pushes: With the sensors' scales out.
         mass_kg: Of the rig, taken as true.
         arms: (8,) torque over force by the rig, m.
+        link_sigma_s: What the IMU's link leaves unknown of both delays alike.
     """
     sigma = np.sqrt(pushes.covariance.diagonal())
     found: dict[str, Found] = {}
@@ -131,7 +133,7 @@ def valve_findings(fit: ValveFit, model: ValveModel, pushes: Pushes, mass_kg: fl
         found["inertia_kg_m2"] = _inertia(pushes, mass_kg, arms, turning)
     else:
         unseen["inertia_kg_m2"] = "no valve is known well enough both to push and to turn"
-    return Findings(found, unseen) + _timing(fit)
+    return Findings(found, unseen) + _timing(fit, link_sigma_s)
 
 
 def _inertia(pushes: Pushes, mass_kg: float, arms: Array, valves: list[int]) -> Found:
@@ -153,10 +155,11 @@ def _inertia(pushes: Pushes, mass_kg: float, arms: Array, valves: list[int]) -> 
     return Found(value, sigma, "kg m^2", remark)
 
 
-def _timing(fit: ValveFit) -> Findings:
+def _timing(fit: ValveFit, link_sigma_s: float) -> Findings:
     found: dict[str, Found] = {}
     unseen: dict[str, str] = {}
     sigma = fit.sigma
+    sigma[[OPEN, CLOSE]] = np.hypot(sigma[[OPEN, CLOSE]], link_sigma_s)
     rows = (
         ("valves.open_delay_s", OPEN, min(DELAY_KNOWN_S, LEARNED * DELAY_SIGMA_S), "s"),
         ("valves.close_delay_s", CLOSE, min(DELAY_KNOWN_S, LEARNED * DELAY_SIGMA_S), "s"),
