@@ -65,6 +65,12 @@ def grid_of(arrival_s: Array) -> Grid | str:
     return Grid(float(slope), scatter / spread, scatter, len(arrival_s), int(number[-1] - number[0]) + 1)
 
 
+def scatter_of(flight: RecordedFlight) -> float:
+    """Return by how much exposures scatter about their stamps, s; 0 where no even clock shows it."""
+    grid = grid_of(np.asarray(flight.arrival_ns * 1e-9, dtype=np.float64))
+    return 0.0 if isinstance(grid, str) else grid.scatter_s
+
+
 def camera_of(
     flight: RecordedFlight, motion: SmoothedMotion, rate_rad_s: Array, guess_s: float, progress: Progress
 ) -> Findings:

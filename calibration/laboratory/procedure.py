@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from calibration.flights import opened
-from calibration.laboratory.camera import camera_of
+from calibration.laboratory.camera import camera_of, scatter_of
 from calibration.laboratory.findings import Findings
 from calibration.laboratory.recorded_flight import RecordedFlight, read_flight
 from calibration.laboratory.smoothed_motion import (
@@ -109,7 +109,7 @@ def fit_laboratory(
             span_s = flight.windows.polls * POLL_S
             densities = (fit.spreads.rate_rad_s * span_s**0.5, fit.spreads.force_m_s2 * span_s**0.5)
             progress(f"smoothing {flight.vehicle} with the noise that was found", math.nan)
-            motions.append(smoothed(recording, rig, flight, densities))
+            motions.append(smoothed(recording, rig, flight, densities, scatter_of(flight)))
             fits.append(fit)
     progress("fitting the table", math.nan)
     logs = [motion.log for motion in motions]

@@ -66,6 +66,7 @@ def smoothed(
     rig: Rig,
     flight: RecordedFlight,
     densities: tuple[float, float] | None = None,
+    jitter_s: float = 0.0,
 ) -> SmoothedMotion:
     """Smooth a flight by replaying its fusion.
 
@@ -74,6 +75,7 @@ def smoothed(
         rig: Of it.
         flight: What was read of it.
         densities: White noise of gyro and accelerometers where it is known better than by the rig.
+        jitter_s: Scatter of the exposures about their stamps.
 
     Raises:
         CalibrationRefusedError: It never had a pose while it flew.
@@ -82,6 +84,7 @@ def smoothed(
     noise = rig_noise(rig, flight.vehicle)
     if densities is not None:
         noise = replace(noise, gyro_density_rad_s_rthz=densities[0], acc_density_m_s2_rthz=densities[1])
+    noise = replace(noise, fix_time_sigma_s=max(noise.fix_time_sigma_s, jitter_s))
     tap = Tap(noise)
     fuse(recording, rig, flight.vehicle, tap)
     tap.settled()
