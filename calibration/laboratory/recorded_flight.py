@@ -35,7 +35,7 @@ _NS = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedFlight:
-    """One vehicle afloat, times in polls of its IMU block since ``origin_ns``.
+    """One vehicle during its longest flight, times in polls of its IMU block since ``origin_ns``.
 
     Attributes:
         vehicle: Its name.
@@ -102,9 +102,8 @@ def read_flight(recording: Recording, rig: Rig, vehicle: str, camera_delay_s: fl
     tick, sizes = imu[:, 1], imu[:, 2]
     size = int(np.median(sizes))
     stamp_ns, per_poll_ns = _clock(imu[:, 0], tick, imu[:, 3])
-    inside = np.zeros(len(imu), dtype=np.bool_)
-    for start_ns, stop_ns in afloat:
-        inside |= (stamp_ns > start_ns + LIFTED_S * 1e9) & (stamp_ns < stop_ns)
+    start_ns, stop_ns = max(afloat, key=lambda span: min(span[1], stamp_ns[-1]) - span[0])
+    inside = (stamp_ns > start_ns + LIFTED_S * 1e9) & (stamp_ns < stop_ns)
     inside &= (sizes == size) & np.isfinite(imu[:, 4:]).all(axis=1)
     if inside.sum() * size * POLL_S < SHORTEST_S:
         raise CalibrationRefusedError(

@@ -90,6 +90,9 @@ def smoothed(
     tap.settled()
     log = flight_log(flight.vehicle, tap)
     states = np.array([tuple(state[:13]) for state in tap.states() if state is not None])
+    # setting down is a blow that no accelerometer follows
+    began_s = log.end_s[0] - states[0, 0] * 1e-9
+    log = _until(log, float(flight.stamp_ns[-1]) * 1e-9 + began_s)
     t = states[:, 0]
     middle = flight.stamp_ns - 0.5 * (flight.windows.polls - 1) * POLL_S * 1e9
     if t[0] > middle[-1]:
@@ -115,6 +118,27 @@ def smoothed(
         at[:, 9:12] ** 2,
         (float(last.x[es.GYRO_SCALE]), float(last.P[es.GYRO_SCALE, es.GYRO_SCALE])),
         log,
+    )
+
+
+def _until(log: FlightLog, end_s: float) -> FlightLog:
+    """Return what a log holds until a moment."""
+    packets, fixes = int((log.end_s <= end_s).sum()), int((log.fix_s <= end_s).sum())
+    return replace(
+        log,
+        end_s=log.end_s[:packets],
+        span_s=log.span_s[:packets],
+        force_body_m_s2=log.force_body_m_s2[:packets],
+        warmth_k=log.warmth_k[:packets],
+        heading_rad=log.heading_rad[:packets],
+        position_table_m=log.position_table_m[:packets],
+        is_hole=log.is_hole[:packets],
+        fix_s=log.fix_s[:fixes],
+        fix_position_m=log.fix_position_m[:fixes],
+        fix_covariance_m2=log.fix_covariance_m2[:fixes],
+        fix_heading_rad=log.fix_heading_rad[:fixes],
+        fix_velocity_m_s=log.fix_velocity_m_s[:fixes],
+        rests_s=tuple((a, min(b, end_s)) for a, b in log.rests_s if a < end_s),
     )
 
 
