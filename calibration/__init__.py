@@ -5,6 +5,7 @@
 ``table``     slope and waves of the table
 ``sky``       star list, lens, mount and delay of the star camera
 ``overhead``  where the camera over the table hangs
+``laboratory``  valves, table, sensors and camera as an emulator has to have them, from one flight
 ============  ==========================================================================================
 
 Each holds mathematics, procedures (data in, ``Outcome`` out), figures and ``commands``. ``commands.py`` lists

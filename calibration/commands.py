@@ -30,6 +30,9 @@ CALIBRATE = Group(
         "table-map": Command(
             "calibration.table.commands:table_map", "Table: slope and waves from flights, how to level it."
         ),
+        "laboratory": Command(
+            "calibration.laboratory.commands:laboratory", "Emulated laboratory: fitted to an ordinary flight."
+        ),
         "survey": Command("calibration.sky.commands:survey", "Sky: the star list from a sweep."),
         "amend": Command(
             "calibration.sky.commands:amend", "Sky: the star list brought up to date by a flight."

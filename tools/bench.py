@@ -29,6 +29,7 @@ from bench import (  # noqa: E402
     fault_flights,
     fresh_clone,
     house,
+    laboratory_fit,
     live,
     live_faults,
     lockstep_speed,
@@ -81,6 +82,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "star_peers": star_peers.measure,
         "star_folder": star_folder.measure,
         "overhead": overhead.measure,
+        "laboratory_fit": laboratory_fit.measure,
         "fusion": fusion_accuracy.measure,
         "fusion_speed": fusion_speed.measure,
         "fusion_peers": fusion_peers.measure,
@@ -91,7 +93,9 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 """THE TABLE of subjects, in the order of the page."""
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
-ON_REQUEST = frozenset({"campaign", "fresh_clone", "fault_flights", "live_faults", "deaths", *FOLDERS})
+ON_REQUEST = frozenset(
+    {"campaign", "fresh_clone", "fault_flights", "laboratory_fit", "live_faults", "deaths", *FOLDERS}
+)
 
 
 def run(arguments: argparse.Namespace) -> list[Row]:

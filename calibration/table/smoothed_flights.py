@@ -43,7 +43,7 @@ class Source:
     """Where the legs stand, likewise."""
 
 
-class _Tap(OfflineSmoother):
+class Tap(OfflineSmoother):
     """The smoother, with a copy of everything it was fed."""
 
     def __init__(self, noise: NoiseModel) -> None:
@@ -90,24 +90,24 @@ def read_source(path: Path, rig_path: Path | None, vehicle: str | None) -> Sourc
     """
     if path.is_dir():
         data = read_folder(path)
-        tap = _Tap(data.noise)
+        tap = Tap(data.noise)
         estimate(data, tap)
         tap.settled()
-        return Source(path, (_flight_log(path.name, tap),), None)
+        return Source(path, (flight_log(path.name, tap),), None)
     with opened(path, rig_path) as (recording, rig):
         if vehicle is not None and vehicle not in rig.vehicles:
             raise UsageError(f"{path} has no vehicle {vehicle!r}; there are {', '.join(rig.vehicles)}.")
         logs = []
         for name in rig.vehicles if vehicle is None else (vehicle,):
-            tap = _Tap(rig_noise(rig, name))
+            tap = Tap(rig_noise(rig, name))
             fuse(recording, rig, name, tap)
-            logs.append(_flight_log(f"{path.name}:{name}", tap))
+            logs.append(flight_log(f"{path.name}:{name}", tap))
     table = rig.table
     edges = (table.x_min_m, table.x_max_m, table.y_min_m, table.y_max_m)
     return Source(path, tuple(logs), edges, table.legs)
 
 
-def _flight_log(name: str, tap: _Tap) -> FlightLog:
+def flight_log(name: str, tap: Tap) -> FlightLog:
     """Lay packets, smoothed states and used fixes out as arrays."""
     states = tap.states()
     known = [i for i, state in enumerate(states) if state is not None]

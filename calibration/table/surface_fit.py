@@ -126,19 +126,24 @@ def _posterior(J: Array, h: Array, prior: Array) -> tuple[Array, Array]:
     return covariance @ h, covariance
 
 
+def cost_of_waves(J: Array, h: Array, basis: SurfaceBasis, slope_sigma: float, log: Array) -> float:
+    """Return minus the logarithm of the marginal likelihood by the logarithms of waviness and length."""
+    waviness, length = math.exp(log[0]), math.exp(log[1])
+    root = np.sqrt(_prior(basis, waviness, length, slope_sigma))
+    factor = cho_factor(np.eye(len(h)) + root[:, None] * J * root)
+    scaled = root * h
+    fit = float(scaled @ cho_solve(factor, scaled))
+    volume = 2.0 * float(np.log(factor[0].diagonal()).sum())
+    known = ((log[0] - math.log(TYPICAL_WAVINESS_M_S2)) / math.log(WAVINESS_FACTOR)) ** 2
+    known += ((log[1] - math.log(TYPICAL_LENGTH_M)) / math.log(LENGTH_FACTOR)) ** 2
+    return float(0.5 * (volume - fit + known))
+
+
 def _most_evident(J: Array, h: Array, basis: SurfaceBasis, slope_sigma: float) -> tuple[float, float]:
     """Return waviness and length of largest marginal likelihood, with weak priors on their logarithms."""
 
     def cost(log: Array) -> float:
-        waviness, length = math.exp(log[0]), math.exp(log[1])
-        root = np.sqrt(_prior(basis, waviness, length, slope_sigma))
-        factor = cho_factor(np.eye(len(h)) + root[:, None] * J * root)
-        scaled = root * h
-        fit = float(scaled @ cho_solve(factor, scaled))
-        volume = 2.0 * float(np.log(factor[0].diagonal()).sum())
-        known = ((log[0] - math.log(TYPICAL_WAVINESS_M_S2)) / math.log(WAVINESS_FACTOR)) ** 2
-        known += ((log[1] - math.log(TYPICAL_LENGTH_M)) / math.log(LENGTH_FACTOR)) ** 2
-        return float(0.5 * (volume - fit + known))
+        return cost_of_waves(J, h, basis, slope_sigma, log)
 
     # shorter than this the modes that are left out would matter
     shortest = math.log(0.35 * basis.shortest_wave_m)

@@ -28,6 +28,10 @@ class ImuConfig(Settings):
 
     model: Literal["published", "datasheet"] = "published"
     """Noise of the published experiment, or of the data sheets (22 times the gyro noise)."""
+    gyro_noise_rad_s: NonNegative | None = None
+    """Standard deviation of one poll before rounding; the model's if absent."""
+    acc_noise_m_s2: NonNegative | None = None
+    """Likewise, of the difference of an inclinometer's two channels."""
     frame_version: Literal[1, 2] = 2
     baud: Literal[115200, 250000] = 250000
     """Nominal; the PIC's divider makes 113636 of 115200."""
@@ -76,7 +80,7 @@ def build(mock_up: MockUp, settings: ImuConfig) -> ImuBlock:
     """The block that a mock-up carries."""
     sensors = ImuSensors(
         _draw_errors(settings, mock_up.random("imu errors")),
-        noise_figures(settings.model),
+        noise_figures(settings.model, settings.gyro_noise_rad_s, settings.acc_noise_m_s2),
         mock_up.random("imu noise"),
         settings.outlier_rate_hz,
     )

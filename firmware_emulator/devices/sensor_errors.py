@@ -1,7 +1,7 @@
 """How far gyro and inclinometers are from perfect: noise, biases, scales, temperature."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from firmware_emulator.plant.air_table import GRAVITY_M_S2
@@ -26,18 +26,30 @@ _TILT_DENSITY_RAD = math.radians(0.0004)  # per sqrt(Hz), SCA103T data sheet
 _TILT_BANDWIDTH_HZ = 18.0
 
 
-def noise_figures(model: Literal["published", "datasheet"]) -> NoiseFigures:
-    """Figures of the published experiment (white polls), or of the data sheets (filtered noise)."""
-    if model == "published":
-        return NoiseFigures(0.0017453292519943296, 0.002, 0.0, 0.0)
-    gyro_band = math.sqrt(_GYRO_BANDWIDTH_HZ * math.pi / 2.0)  # noise bandwidth of a first-order filter
-    tilt_band = math.sqrt(_TILT_BANDWIDTH_HZ * math.pi / 2.0)
-    return NoiseFigures(
-        _GYRO_DENSITY_RAD_S * gyro_band,
-        _TILT_DENSITY_RAD * GRAVITY_M_S2 * tilt_band,
-        _GYRO_BANDWIDTH_HZ,
-        _TILT_BANDWIDTH_HZ,
-    )
+def noise_figures(
+    model: Literal["published", "datasheet"],
+    gyro_rms_rad_s: float | None = None,
+    acc_rms_m_s2: float | None = None,
+) -> NoiseFigures:
+    """Figures of the published experiment (white polls), or of the data sheets (filtered noise).
+
+    What is stated takes the place of the model's own deviation.
+    """
+    figures = _PUBLISHED if model == "published" else _DATASHEET
+    if gyro_rms_rad_s is not None:
+        figures = replace(figures, gyro_rms_rad_s=gyro_rms_rad_s)
+    if acc_rms_m_s2 is not None:
+        figures = replace(figures, acc_rms_m_s2=acc_rms_m_s2)
+    return figures
+
+
+_PUBLISHED = NoiseFigures(0.0017453292519943296, 0.002, 0.0, 0.0)
+_DATASHEET = NoiseFigures(  # noise bandwidth of a first-order filter
+    _GYRO_DENSITY_RAD_S * math.sqrt(_GYRO_BANDWIDTH_HZ * math.pi / 2.0),
+    _TILT_DENSITY_RAD * GRAVITY_M_S2 * math.sqrt(_TILT_BANDWIDTH_HZ * math.pi / 2.0),
+    _GYRO_BANDWIDTH_HZ,
+    _TILT_BANDWIDTH_HZ,
+)
 
 
 @dataclass(frozen=True, slots=True)
