@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,13 +53,9 @@ class PacketHistory:
 
     def forget_before(self, t_s: float, keep: int = 64) -> None:
         """Drop packets that ended at or before `t_s`, except the newest `keep` of them."""
-        n = len(self.rows) // COLUMNS
-        if n:
-            ends = np.frombuffer(self.rows).reshape(n, COLUMNS)[:, 0]
-            first = int(np.searchsorted(ends, t_s, side="right")) - keep
-            del ends  # the array cannot shrink while a view looks at it
-            if first > 0:
-                del self.rows[: first * COLUMNS]
+        first = bisect_right(self._ends(), t_s) - keep
+        if first > 0:
+            del self.rows[: first * COLUMNS]
 
     def clear(self) -> None:
         """Drop everything."""
@@ -66,9 +63,7 @@ class PacketHistory:
 
     def rate_at(self, t_s: float) -> float:
         """Return the gyro's reading in the packet that covers `t_s`, or in the nearest one."""
-        n = len(self.rows) // COLUMNS
-        ends = np.frombuffer(self.rows)[::COLUMNS]
-        row = min(int(np.searchsorted(ends, t_s)), n - 1)
+        row = min(bisect_left(self._ends(), t_s), len(self) - 1)
         return self.rows[row * COLUMNS + 2]
 
     def jump_rad_s(self) -> float:
@@ -81,18 +76,23 @@ class PacketHistory:
 
         Time before the first packet, which nothing covers, is left out: the segment starts later.
         """
-        n = len(self.rows) // COLUMNS
-        table = np.frombuffer(self.rows).reshape(n, COLUMNS)
-        ends = table[:, 0]
-        first = int(np.searchsorted(ends, start_s + 1e-9, side="right"))
-        last = min(int(np.searchsorted(ends, stop_s - 1e-9, side="left")), n - 1)
+        ends = self._ends()
+        first = bisect_right(ends, start_s + 1e-9)
+        last = min(bisect_left(ends, stop_s - 1e-9), len(ends) - 1)
         if last < first:
             empty = np.zeros(0)
             return Segment(empty, empty, empty, empty, empty, empty, empty, start_s, start_s)
-        part = table[first : last + 1].T.copy()
+        part = np.array(self.rows[first * COLUMNS : (last + 1) * COLUMNS]).reshape(-1, COLUMNS).T.copy()
         part[1, 0] = min(part[1, 0], part[0, 0] - start_s)
         if part[0, -1] > stop_s:
             part[1, -1] -= part[0, -1] - stop_s
             part[0, -1] = stop_s
         begin, end = float(part[0, 0] - part[1, 0]), float(part[0, -1])
         return Segment(part[0], part[1], part[2], part[3], part[4], part[5], part[6], begin, end)
+
+    def _ends(self) -> array[float]:
+        """End of each packet: a copy, for the rows cannot grow while anything looks at them.
+
+        A view would do only if nobody kept the frame that holds it, as profilers and debuggers do.
+        """
+        return self.rows[::COLUMNS]
