@@ -220,7 +220,7 @@ def read_content(path: Path) -> dict[str, Any]:
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such scenario or rig file") from error
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror})") from error
+        raise UsageError(f"{path}: cannot be read as a scenario or rig file ({error.strerror})") from error
     except FileError as error:
         raise UsageError(in_one_line(str(error))) from error
 

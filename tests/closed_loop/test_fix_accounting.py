@@ -51,7 +51,10 @@ def test_accounts_are_shown_and_reported(fly, tmp_path):
     rig_path.write_text(text)
     run_lockstep(parse_rig(text, rig_path), text, rig_path, tmp_path / "run.mcap", 7.0, 1, lambda *_: None)
     written = write_report(tmp_path / "run.mcap", tmp_path / "report", lambda *_: None)
-    assert tmp_path / "report" / "fixes.png" in written
+    assert tmp_path / "report" / "report.html" in written
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "Innovations of used fixes" in page
+    assert "outside the gate" in page
     reported = json.loads((tmp_path / "report" / "report.json").read_text())["vehicles"]["alpha"]
     assert reported["fixes"]["outside the gate"] >= 1
     assert 0.1 < reported["fix_nis_mean"] < 12.0

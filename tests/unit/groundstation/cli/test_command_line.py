@@ -82,7 +82,7 @@ def test_a_package_adds_a_command_and_a_group(install, groundstation):
     install("waving", COMMAND, "wave = waving:WAVE\ngreet = waving:GREET")
     overview = groundstation("--help").output
     assert "wave          Wave to the table." in overview
-    assert "run           Fly the vehicles of a rig." in overview
+    assert "run           Fly the vehicles of a rig, or a scenario." in overview
     assert groundstation("wave", "2").output == "hello hello \n"
     assert groundstation("greet", "wave", "1").output == "hello \n"
     assert "gone  Gone." in groundstation("greet", "--help").output

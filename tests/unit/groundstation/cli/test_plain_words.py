@@ -92,7 +92,10 @@ def test_a_rig_and_files_beyond_ascii_fly_under_an_ascii_locale(tmp_path):
     assert done.returncode == 0, done.stderr + done.stdout
     done = run("run", folder / "Nord.toml", "--lockstep", "--duration", "1")
     assert done.returncode == 2
-    assert done.stderr.decode() == f"groundstation: {folder / 'Nord.toml'}: there is no such rig file\n"
+    assert (
+        done.stderr.decode()
+        == f"groundstation: {folder / 'Nord.toml'}: there is no such scenario or rig file\n"
+    )
 
 
 @pytest.mark.parametrize("value", ["inf", "-inf", "nan", "1e400"])

@@ -105,7 +105,7 @@ def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["nowhere.toml"], "nowhere.toml: there is no such rig file"),
+        (["nowhere.toml"], "nowhere.toml: there is no such scenario or rig file"),
         ([RIGS / "drawn_fixes.toml", "--lockstep"], "--lockstep needs --duration"),
         ([RIGS / "drawn_fixes.toml", "--seed", "3"], "--seed goes with --lockstep"),
         ([RIGS / "drawn_fixes.toml", "--record", RECORDED], "never overwritten"),
@@ -118,7 +118,7 @@ def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys):
         ([RIGS / "drawn_fixes.toml", "--compare", RECORDED], "--compare goes with --report"),
         ([RIGS / "drawn_fixes.toml", "--report", "r", "--compare", "no.mcap"], "no.mcap cannot be opened"),
         ([RIGS / "drawn_fixes.toml", "--report", "r", "--compare", RIGS / "overhead.toml"], "is no MCAP"),
-        ([RIGS], "cannot be read as a rig file"),
+        ([RIGS], "cannot be read as a scenario or rig file"),
     ],
 )  # fmt: skip
 def test_a_call_that_makes_no_sense_is_refused(words, expected, capsys):

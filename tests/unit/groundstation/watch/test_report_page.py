@@ -43,7 +43,7 @@ VERDICT = Verdict(
     "failed",
     "position_error_rms_mm of alpha is 12.34, expected below 8",
     LIMITS,
-    (RunEvent(1.25, "marker", "", "alpha <has> settled"), RunEvent(2.0, "fault", "alpha", "told twice")),
+    (RunEvent(1.25, "note", "", "alpha <has> settled"), RunEvent(2.0, "fault", "alpha", "told twice")),
     zero_s=2.5,
     title="a rehearsal",
     obstacles=((0.5, 0.5, 0.15),),
@@ -189,7 +189,7 @@ def test_what_happened_is_listed_from_the_recording_and_from_the_verdict(judged)
     assert any("go_to (x_m = 0.3" in text and text.endswith(": accepted") for text in asked)
     assert any("x_m = 30" in text and "refused: " in text for text in asked)
     assert any(kind == "fault" and text.startswith("imu_") for kind, text in rows)
-    assert rows["marker", "alpha <has> settled"]["t_s"] == 1.25
+    assert rows["note", "alpha <has> settled"]["t_s"] == 1.25
     assert not any(text == "told twice" for _, text in rows), "faults are read from the recording"
     moments = [row["t_s"] for row in numbers["events"]]
     assert moments == sorted(moments)
@@ -207,7 +207,7 @@ def test_failures_faults_requests_and_marks_stand_on_every_time_axis(judged):
     for label, picture in over_time.items():
         for marks in of_class(picture, "marks"):
             panels += 1
-            for kind in ("failure", "fault", "request", "marker"):
+            for kind in ("failure", "fault", "request", "note"):
                 assert len(of_class(marks, "mark", kind)) == expected.count(kind), (label, kind)
             assert len(of_class(marks, "span", "failure")) == 1
     assert panels == 1 + 2 + 3 + 3 + 4
