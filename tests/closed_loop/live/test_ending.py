@@ -50,9 +50,11 @@ def test_a_run_that_is_still_starting_ends_as_soon(launch, nothing_left):
 def test_a_duration_ends_by_itself_and_leaves_a_report(launch, two_drawn):
     run = launch(two_drawn, "--duration", "5", "--report", str(two_drawn.parent / "report"))
     assert run.process.wait(60) == 0
-    assert sorted(path.name for path in (two_drawn.parent / "report").iterdir()) == [
-        "errors.png", "fixes.png", "latency.png", "report.json", "table.png", "valves.png",
-    ]  # fmt: skip
+    report = two_drawn.parent / "report"
+    assert sorted(path.name for path in report.iterdir()) == ["report.html", "report.json"]
+    page = (report / "report.html").read_text()
+    for title in ("On the table", "Off the setpoint", "Valves and gas", "Fixes", "Latency"):
+        assert f"<h2>{title}</h2>" in page
 
 
 def test_a_killed_launcher_takes_every_process_with_it(launch, two_drawn, nothing_left):
