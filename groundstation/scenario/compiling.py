@@ -5,40 +5,20 @@ key and what was expected.
 """
 
 import itertools
-import json
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from groundstation.control.controllers import controllers
-from groundstation.declarations.request import Action, ArgumentError
-from groundstation.declarations.rig import MOCK_UP_RADIUS_M, HoldSection, Rig
-from groundstation.parts.control.actions import GO_TO
+from groundstation.declarations.rig import Rig
 from groundstation.parts.control.sections import control_of, neighbours_of
-from groundstation.parts.laboratory.failure_desk import INJECT
-from groundstation.parts.scenario.conditions import (
-    SETTLED,
-    SETTLED_FOR_NS,
-    Condition,
-    ConditionError,
-    plain,
-    read_condition,
-)
-from groundstation.parts.scenario.part import bounds_of
 from groundstation.parts.supervision.sections import SupervisionOfVehicle
 from groundstation.rig.variation import varied
-from groundstation.scenario.scenario_file import ALL, FOLLOWERS, Limit, Obstacle, Row, ScenarioFile
-from groundstation.supervision.apart import too_near
-
-Changes = dict[str, Any]
-Groups = Mapping[str, tuple[str, ...]]
-
+from groundstation.scenario.key_trouble import KeyTroubleError
+from groundstation.scenario.places import check_places, check_starts
+from groundstation.scenario.scenario_file import ALL, FOLLOWERS, Limit, ScenarioFile
+from groundstation.scenario.timeline import Changes, Groups, members, timeline_rows
 
 OWN_SECTION = "scenario"
-
-
-class KeyTroubleError(ValueError):
-    """What is wrong with a scenario; the text begins with the key."""
 
 
 def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> Rig:
@@ -56,9 +36,9 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
     for name in file.vehicles:
         if name not in rig.vehicles:
             raise KeyTroubleError(f"vehicles.{name}: the rig has no such vehicle (it has: {_listed(rig)})")
-    _check_starts(file, rig)
+    check_starts(file, rig)
     changed = varied(rig, _changes(file, rig, is_hardware=is_hardware))
-    _check_places(file, changed)
+    check_places(file, changed)
     groups = groups_of(changed)
     starters = tuple(name for name in changed.vehicles if _starts_by_itself(changed, name))
     if not starters:
@@ -70,7 +50,7 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
         "starters": list(starters),
         "settle_first": is_hardware,
         "resumed": [name for name in starters if _has_program(changed, name)],
-        "timeline": list(_rows(file, changed, groups)),
+        "timeline": list(timeline_rows(file, changed, groups)),
     }
     return varied(changed, {OWN_SECTION: section})
 
@@ -90,10 +70,10 @@ def expanded(limit: Limit, number: int, groups: Groups) -> list[tuple[str, ...]]
     """
     key = f"limits.{number}"
     if limit.vehicles is not None:
-        names = [name for word in limit.vehicles for name in _members(f"{key}.vehicles", word, groups)]
+        names = [name for word in limit.vehicles for name in members(f"{key}.vehicles", word, groups)]
         return list(itertools.combinations(dict.fromkeys(names), 2)) if len(names) > 1 else [(names[0],)]
     assert limit.vehicle is not None
-    return [(name,) for name in _members(f"{key}.vehicle", limit.vehicle, groups)]
+    return [(name,) for name in members(f"{key}.vehicle", limit.vehicle, groups)]
 
 
 def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
@@ -139,162 +119,6 @@ def _starts_by_itself(rig: Rig, vehicle: str) -> bool:
 
 def _has_program(rig: Rig, vehicle: str) -> bool:
     return controllers()[control_of(rig, vehicle)[0].controller].has_program
-
-
-# -- places ---------------------------------------------------------------------------------------------
-
-
-def _check_places(file: ScenarioFile, rig: Rig) -> None:
-    """Starts are on the table, apart from each other and from obstacles."""
-    for number, obstacle in enumerate(file.obstacles):
-        table = rig.table
-        if not (
-            table.x_min_m <= obstacle.x_m <= table.x_max_m and table.y_min_m <= obstacle.y_m <= table.y_max_m
-        ):
-            raise KeyTroubleError(
-                f"obstacles.{number}: ({obstacle.x_m:g}, {obstacle.y_m:g}) m is off the table"
-            )
-    starts = {name: (_start_key(file, name), rig.vehicles[name].hold) for name in rig.vehicles}
-    for key, hold in starts.values():
-        refusal = _off_place(hold.x_m, hold.y_m, rig, file.obstacles)
-        if refusal:
-            raise KeyTroubleError(f"{key}: {refusal}")
-    for (name, (_, hold)), (_, (key, its)) in itertools.combinations(starts.items(), 2):
-        apart_m = math.dist((hold.x_m, hold.y_m), (its.x_m, its.y_m))
-        refusal = too_near(f"the start of {name}", apart_m, relation="from there")
-        if refusal:
-            raise KeyTroubleError(f"{key}: {refusal}")
-
-
-def _start_key(file: ScenarioFile, vehicle: str) -> str:
-    """The key of a vehicle's start: the scenario's, or the rig's pose to hold."""
-    keys = file.vehicles.get(vehicle)
-    return f"vehicles.{vehicle}.{'hold' if keys is None or keys.start is None else 'start'}"
-
-
-def _check_starts(file: ScenarioFile, rig: Rig) -> None:
-    """Starts of the scenario are on the table, in its own words before the rig's."""
-    for name, keys in file.vehicles.items():
-        start: HoldSection | None = keys.start
-        if start is not None and not rig.table.holds(start.x_m, start.y_m):
-            raise KeyTroubleError(f"vehicles.{name}.start: {_off_table(start.x_m, start.y_m)}")
-
-
-def _off_table(x_m: float, y_m: float) -> str:
-    return f"({x_m:g}, {y_m:g}) m is nearer than {MOCK_UP_RADIUS_M:g} m to the table's edge, or beyond it"
-
-
-def _off_place(x_m: float, y_m: float, rig: Rig, obstacles: tuple[Obstacle, ...]) -> str:
-    """Why a mock-up cannot be at a place; empty if it can."""
-    if not rig.table.holds(x_m, y_m):
-        return _off_table(x_m, y_m)
-    for obstacle in obstacles:
-        room_m = math.dist((x_m, y_m), (obstacle.x_m, obstacle.y_m)) - obstacle.radius_m - MOCK_UP_RADIUS_M
-        if room_m < 0.0:
-            return (
-                f"({x_m:g}, {y_m:g}) m is on the obstacle at ({obstacle.x_m:g}, {obstacle.y_m:g}) m: "
-                f"{-room_m:.2f} m farther away would be free"
-            )
-    return ""
-
-
-# -- the timeline ---------------------------------------------------------------------------------------
-
-
-def _rows(file: ScenarioFile, rig: Rig, groups: Groups) -> Iterator[Changes]:
-    earliest_s = 0.0
-    for number, row in enumerate(file.timeline):
-        key = f"timeline.{number}"
-        made: Changes = {"where": key}
-        if row.when is None:
-            assert row.at_s is not None
-            made["at_s"] = earliest_s = row.at_s
-        else:
-            condition = _condition(row, key, rig, groups)
-            earliest_s += row.after_s + (SETTLED_FOR_NS * 1e-9 if _needs_settling(condition) else 0.0)
-            if earliest_s > file.duration_s:
-                raise KeyTroubleError(
-                    f"{key}.when: {row.when!r} cannot come true before the end: not before {earliest_s:g} s, "
-                    f"duration_s = {file.duration_s:g}"
-                )
-            made |= {"when": plain(condition), "timeout_s": row.timeout_s, "after_s": row.after_s}
-        if row.mark is not None:
-            made["mark"] = row.mark
-        else:
-            assert row.vehicle is not None
-            vehicles = _members(f"{key}.vehicle", row.vehicle, groups)
-            action, arguments = _asked(row, key, rig, file)
-            made |= {"vehicles": list(vehicles), "action": action, "arguments": json.dumps(arguments)}
-            made["answer"] = row.answer
-        yield made
-
-
-def _condition(row: Row, key: str, rig: Rig, groups: Groups) -> Condition:
-    assert row.when is not None
-    assert row.timeout_s is not None
-    try:
-        condition = read_condition(row.when, groups, bounds_of(rig))
-    except ConditionError as error:
-        raise KeyTroubleError(f"{key}.when: {error}") from error
-    if _needs_settling(condition) and row.timeout_s <= SETTLED_FOR_NS * 1e-9:
-        raise KeyTroubleError(
-            f"{key}.timeout_s: {row.timeout_s:g} s is too short, a vehicle has settled after "
-            f"{SETTLED_FOR_NS * 1e-9:g} s at the earliest"
-        )
-    return condition
-
-
-def _needs_settling(condition: Condition) -> bool:
-    return any(term.flag == SETTLED for term in condition.terms)
-
-
-def _asked(row: Row, key: str, rig: Rig, file: ScenarioFile) -> tuple[str, dict[str, Any]]:
-    """Action and arguments, in radians."""
-    if row.failure is not None:
-        parameters = json.dumps(row.parameters)
-        try:
-            given = INJECT.check({"failure": row.failure, "for_s": row.for_s, "parameters": parameters})
-        except ArgumentError as error:
-            raise KeyTroubleError(f"{key}: {error}") from error
-        return INJECT.name, dict(given)
-    assert row.request is not None
-    actions = rig.tables.actions
-    if row.request not in actions or row.request == INJECT.name:
-        known = ", ".join(sorted(set(actions) - {INJECT.name}))
-        raise KeyTroubleError(f"{key}.request: {row.request!r} is no action (there are: {known})")
-    given = _arguments(actions[row.request], row, key)
-    if row.request == GO_TO.name and row.answer == "accepted":
-        refusal = _off_place(float(given["x_m"]), float(given["y_m"]), rig, file.obstacles)
-        if refusal:
-            raise KeyTroubleError(f"{key}.arguments: {refusal}")
-    return row.request, given
-
-
-def _arguments(action: Action, row: Row, key: str) -> dict[str, Any]:
-    """By the action's own names: files speak degrees."""
-    in_file = {
-        f"{argument.name.removesuffix('_rad')}_deg": argument.name
-        for argument in action.arguments
-        if argument.name.endswith("_rad")
-    }
-    given: dict[str, Any] = {}
-    for name, value in row.arguments.items():
-        if name in in_file and isinstance(value, int | float) and not isinstance(value, bool):
-            given[in_file[name]] = math.radians(value)
-        else:
-            given[name] = value
-    try:
-        return dict(action.check(given))
-    except ArgumentError as error:
-        raise KeyTroubleError(f"{key}.arguments: {str(error).replace('_rad', '_deg')}") from error
-
-
-def _members(key: str, word: str, groups: Groups) -> tuple[str, ...]:
-    if word not in groups:
-        raise KeyTroubleError(f"{key}: {word!r} is no vehicle of the rig (there are: {', '.join(groups)})")
-    if not groups[word]:
-        raise KeyTroubleError(f"{key}: {word!r} are none here, no vehicle follows another")
-    return groups[word]
 
 
 def _listed(rig: Rig) -> str:

@@ -13,7 +13,8 @@ from groundstation.parts.scenario.player import STARTED_AGAIN
 from groundstation.scenario.compiling import expanded, groups_of
 from groundstation.scenario.flight_log import FlightLog
 from groundstation.scenario.loading import Scenario
-from groundstation.scenario.quantities import QUANTITIES, Flown, Keeps, Span, Value, every_quantity
+from groundstation.scenario.quantities import QUANTITIES, every_quantity
+from groundstation.scenario.run_tracks import Keeps, RunTracks, Span, Value
 from groundstation.supervision.modes import Mode
 from groundstation.watch.verdict import FAILED, PASSED, LimitOutcome, Verdict
 
@@ -33,7 +34,7 @@ class Judged:
 
     verdict: Verdict
     values: dict[str, Value]
-    flown: Flown | None
+    flown: RunTracks | None
 
 
 def judge(scenario: Scenario, log: FlightLog, *, began_ns: int = 0) -> Judged:
@@ -71,10 +72,10 @@ def _verdict(
     )
 
 
-def flown(scenario: Scenario, log: FlightLog) -> Flown:
+def flown(scenario: Scenario, log: FlightLog) -> RunTracks:
     """What the quantities of a run are made from."""
     rig = scenario.rig
-    return Flown(
+    return RunTracks(
         log.tracks(),
         log.events(),
         bounds_of(rig),
@@ -93,7 +94,7 @@ def _keeps(rig: Rig) -> Iterator[tuple[str, Keeps]]:
             yield name, Keeps(config.leader, config.distance_m, config.face)
 
 
-def _outcomes(scenario: Scenario, seen: Flown) -> Iterator[LimitOutcome]:
+def _outcomes(scenario: Scenario, seen: RunTracks) -> Iterator[LimitOutcome]:
     groups = groups_of(scenario.rig)
     for number, limit in enumerate(scenario.file.limits):
         row = QUANTITIES[limit.what]

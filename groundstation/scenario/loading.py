@@ -14,7 +14,8 @@ from groundstation.files.reading import path_of
 from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
 from groundstation.rig.read import load_rig, source_of
 from groundstation.rig.variation import varied
-from groundstation.scenario.compiling import KeyTroubleError, compiled_rig, expanded, groups_of
+from groundstation.scenario.compiling import compiled_rig, expanded, groups_of
+from groundstation.scenario.key_trouble import KeyTroubleError
 from groundstation.scenario.scenario_file import ScenarioError, ScenarioFile, parse_content, read_content
 
 OF_VEHICLE = ("start", "control", "laboratory", "may_land")

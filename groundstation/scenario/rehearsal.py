@@ -19,7 +19,8 @@ from groundstation.runners.make_runner import open_laboratory
 from groundstation.scenario.dispersions import draw, laboratory_seed
 from groundstation.scenario.judging import Judged
 from groundstation.scenario.loading import Scenario
-from groundstation.scenario.quantities import QUANTITIES, Flown, Span, Value
+from groundstation.scenario.quantities import QUANTITIES
+from groundstation.scenario.run_tracks import RunTracks, Span, Value
 from groundstation.scenario.running import Progress, fly, seed_for, silent
 from groundstation.scenario.scenario_file import ScenarioError
 
@@ -136,7 +137,7 @@ def _refusal(judged: Judged, what: str) -> str:
     return f"{what}: {judged.verdict.reason}" if judged.verdict.reason else ""
 
 
-def _contact(flown: Flown) -> str:
+def _contact(flown: RunTracks) -> str:
     """Who touched something first, when and where; empty if nobody did."""
     whole = Span(0.0, flown.duration_s)
     found: list[tuple[str, Value]] = []

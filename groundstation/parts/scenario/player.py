@@ -7,7 +7,8 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.scenario.conditions import Bounds, Condition, Known, read_condition
+from groundstation.parts.scenario.condition_text import read_condition
+from groundstation.parts.scenario.conditions import Bounds, Condition, Known
 from groundstation.parts.scenario.messages import ENDED, FAILED, RUNNING, WAITING, Marker, ScenarioStatus
 from groundstation.parts.scenario.sections import ScenarioSection, TimelineRow
 from groundstation.parts.supervision.messages import Supervision

@@ -7,7 +7,8 @@ import pytest
 
 from groundstation.parts.scenario.conditions import Bounds
 from groundstation.scenario.flight_log import VehicleTrack
-from groundstation.scenario.quantities import QUANTITIES, Flown, Keeps, Span, every_quantity
+from groundstation.scenario.quantities import QUANTITIES, every_quantity
+from groundstation.scenario.run_tracks import Keeps, RunTracks, Span
 from groundstation.watch.verdict import RunEvent
 
 T = np.arange(0.0, 20.0, 0.05)
@@ -33,7 +34,7 @@ def track(x, y=0.0, heading=0.0, setpoint=(0.0, 0.0, 0.0), goals=(), state=None,
 def flown(alpha, beta=None, events=(), obstacles=(), keeps=None):
     tracks = {"alpha": alpha} if beta is None else {"alpha": alpha, "beta": beta}
     bounds = Bounds((-2.0, 2.0), (-1.5, 1.5))
-    return Flown(
+    return RunTracks(
         tracks, tuple(events), bounds, tuple(obstacles), dict.fromkeys(tracks, 0.22), keeps or {}, 20.0
     )
 

@@ -4,14 +4,8 @@ import math
 
 import pytest
 
-from groundstation.parts.scenario.conditions import (
-    MEASURES,
-    Bounds,
-    ConditionError,
-    Known,
-    plain,
-    read_condition,
-)
+from groundstation.parts.scenario.condition_text import ConditionError, plain, read_condition
+from groundstation.parts.scenario.conditions import MEASURES, Bounds, Known
 
 BOUNDS = Bounds((-2.0, 2.0), (-1.5, 1.5))
 GROUPS = {"alpha": ("alpha",), "beta": ("beta",), "all": ("alpha", "beta"), "followers": ()}
