@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from groundstation.cli.live_view import run_live
+from groundstation.cli.run_files import check_recording, finished_files
 from groundstation.cli.run_progress import RunProgress
-from groundstation.cli.runs_files import check_recording, finished_files
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.files.writing import check_folder
@@ -17,7 +17,8 @@ from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
 from groundstation.recording.writer import check_new_recording
 from groundstation.rig.read import parse_rig, read_text
-from groundstation.scenario.scenario_file import is_scenario, read_content
+from groundstation.scenario.loading import made
+from groundstation.scenario.scenario_file import WHAT, content_of, is_scenario
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -69,16 +70,17 @@ def run(
             raise UsageError("--compare goes with --report: the recording is drawn beside the run")
         check_recording(compare)
     default_core()  # before any process starts: what it lacks, all of them would
-    if is_scenario(read_content(file)):
+    text = read_text(file, WHAT)
+    content = content_of(text, file)
+    if is_scenario(content):
         if duration is not None:
             raise UsageError("--duration goes with a rig: a scenario has its own")
-        from groundstation.cli.run_scenario import Flight, run_scenario
+        from groundstation.cli.run_scenario import Asked, run_scenario
 
-        flight = Flight(file, lockstep, headless, seed, record, report, compare, hardware, i_know)
-        raise typer.Exit(run_scenario(flight))
+        asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know)
+        raise typer.Exit(run_scenario(made(content, file), asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
-    text = read_text(file)
     loaded = parse_rig(text, file)
     if record is not None:
         check_new_recording(record)

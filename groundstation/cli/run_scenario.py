@@ -8,8 +8,8 @@ from pathlib import Path
 from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.record_stream import Recorded
 from groundstation.cli.live_view import run_live
+from groundstation.cli.run_files import finished_files
 from groundstation.cli.run_progress import RunProgress
-from groundstation.cli.runs_files import finished_files
 from groundstation.declarations.errors import GroundStationError, NodeError, UsageError
 from groundstation.files.writing import check_folder
 from groundstation.launch.live_run import LiveRun
@@ -18,7 +18,7 @@ from groundstation.recording.errors import RecordingError
 from groundstation.recording.writer import check_new_recording
 from groundstation.rig.read import load_rig, source_of
 from groundstation.scenario.judging import Judged, sentence
-from groundstation.scenario.loading import Scenario, load, rig_text
+from groundstation.scenario.loading import Scenario, rig_text
 from groundstation.scenario.rehearsal import check_dispersions, check_failures, rehearse
 from groundstation.scenario.running import fly_recorded, judge_recordings, longest_s, seed_for
 from groundstation.watch.verdict import PASSED
@@ -28,10 +28,9 @@ HELD, BROKEN, WRONG = 0, 1, 3
 
 
 @dataclass(frozen=True)
-class Flight:
+class Asked:
     """What the command line asks for."""
 
-    file: Path
     lockstep: bool
     headless: bool
     seed: int | None
@@ -42,31 +41,30 @@ class Flight:
     i_know: str | None
 
 
-def run_scenario(flight: Flight) -> int:
+def run_scenario(scenario: Scenario, asked: Asked) -> int:
     """Fly a scenario; return the exit code.
 
     Raises:
         UsageError: The file, or what was asked for, is wrong.
     """
-    if flight.lockstep and flight.hardware is not None:
+    if asked.lockstep and asked.hardware is not None:
         raise UsageError("--hardware runs in real time, --lockstep in virtual time: give one of them")
-    if flight.i_know is not None and not flight.i_know.strip():
+    if asked.i_know is not None and not asked.i_know.strip():
         raise UsageError("--i-know needs a reason in words: it is recorded")
-    if flight.record is not None:
-        check_new_recording(flight.record)
-    if flight.report is not None:
-        check_folder(flight.report)
-    scenario = load(flight.file)
-    seed = seed_for(scenario, flight.seed)
-    if flight.hardware is not None:
-        scenario = _on_hardware(scenario, flight, flight.hardware)
+    if asked.record is not None:
+        check_new_recording(asked.record)
+    if asked.report is not None:
+        check_folder(asked.report)
+    seed = seed_for(scenario, asked.seed)
+    if asked.hardware is not None:
+        scenario = _on_hardware(scenario, asked, asked.hardware)
     else:
         check_failures(scenario)
         check_dispersions(scenario)
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
-    recording = flight.record or scenario.rig.record.directory / f"{stamp}.mcap"
+    recording = asked.record or scenario.rig.record.directory / f"{stamp}.mcap"
     try:
-        judged = _flown(scenario, flight, seed, recording)
+        judged = _flown(scenario, asked, seed, recording)
     except UsageError:
         raise
     except KeyboardInterrupt:
@@ -79,31 +77,31 @@ def run_scenario(flight: Flight) -> int:
     return HELD if judged.verdict.verdict == PASSED else BROKEN
 
 
-def _on_hardware(scenario: Scenario, flight: Flight, path: Path) -> Scenario:
+def _on_hardware(scenario: Scenario, asked: Asked, path: Path) -> Scenario:
     """The scenario on the hardware, once its twin has flown it."""
     hardware = load_rig(path)
     on_hardware = scenario.on_hardware(hardware)
     with RunProgress(longest_s(scenario)) as progress:
-        refusal = rehearse(scenario, hardware, flight.seed, progress)
+        refusal = rehearse(scenario, hardware, asked.seed, progress)
     if not refusal:
         print("dry run on the twin: passed")
         return on_hardware
-    if flight.i_know is None:
+    if asked.i_know is None:
         raise UsageError(f"{refusal}; --i-know REASON flies all the same, and is recorded")
-    print(f"dry run on the twin: {refusal}; flown all the same: {flight.i_know}")
-    return on_hardware.remarked(f"flown although {refusal}: {flight.i_know}")
+    print(f"dry run on the twin: {refusal}; flown all the same: {asked.i_know}")
+    return on_hardware.remarked(f"flown although {refusal}: {asked.i_know}")
 
 
-def _flown(scenario: Scenario, flight: Flight, seed: int, recording: Path) -> Judged:
+def _flown(scenario: Scenario, asked: Asked, seed: int, recording: Path) -> Judged:
     trouble = ""
     try:
-        if flight.lockstep:
+        if asked.lockstep:
             with RunProgress(longest_s(scenario)) as progress:
                 judged, faults = fly_recorded(scenario, seed, recording, progress)
         else:
             if scenario.rig.laboratory is not None:
                 scenario = scenario.vary({"laboratory.seed": seed})
-            judged, faults, trouble = None, None, _fly_live(scenario, flight, recording)
+            judged, faults, trouble = None, None, _fly_live(scenario, asked, recording)
     finally:
         finished, _ = finished_files(recording)
     if judged is None:
@@ -112,10 +110,10 @@ def _flown(scenario: Scenario, flight: Flight, seed: int, recording: Path) -> Ju
         print(line)
     if trouble:
         raise GroundStationError(trouble)
-    if flight.report is not None and finished:
+    if asked.report is not None and finished:
         from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
 
-        print_report(finished[-1], flight.report, verdict=judged.verdict, compare=flight.compare)
+        print_report(finished[-1], asked.report, verdict=judged.verdict, compare=asked.compare)
     return judged
 
 
@@ -154,7 +152,7 @@ class _Watch:
             self.live.monitor.note(text)
 
 
-def _fly_live(scenario: Scenario, flight: Flight, recording: Path) -> str:
+def _fly_live(scenario: Scenario, asked: Asked, recording: Path) -> str:
     """Fly in real time; what is wrong with the recording, empty if nothing is."""
     watch = _Watch()
     watch.live = LiveRun(
@@ -164,7 +162,7 @@ def _fly_live(scenario: Scenario, flight: Flight, recording: Path) -> str:
         recording,
         {ScenarioStatus.TOPIC.noun: watch.status, Marker.TOPIC.noun: watch.marker},
     )
-    headless = flight.headless or not sys.stdout.isatty()
+    headless = asked.headless or not sys.stdout.isatty()
     run_live(watch.live, None, headless=headless, is_over=lambda: watch.is_over)
     for line in watch.live.faults.lines():
         print(line)

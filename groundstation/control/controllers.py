@@ -18,7 +18,7 @@ from groundstation.control.follow import Follow, FollowConfig
 from groundstation.control.formation import Formation, FormationConfig
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.path import Path, PathConfig
+from groundstation.control.path import PathConfig, PathFollowing
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 
@@ -86,7 +86,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
         "path": ControllerRow(
             "follow waypoints, once or round and round",
             PathConfig,
-            Path,
+            PathFollowing,
             {"waypoints_m": ((0.3, 0.0), (0.3, 0.3))},
             has_program=True,
         ),

@@ -7,15 +7,14 @@ one that turns with the leader.
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from groundstation.control.controller import NO_NEIGHBOURS
-from groundstation.control.go_to import GoTo, GoToConfig
+from groundstation.control.at_setpoint import AtSetpoint
+from groundstation.control.go_to import GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.state import BodyWrench, ControlState, Goal
+from groundstation.control.state import ControlState, Goal
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
 
 
@@ -49,41 +48,17 @@ class FollowConfig(BaseModel):
         return self
 
 
-class Follow:
+class Follow(AtSetpoint):
     """Controller row ``follow``."""
 
     def __init__(self, config: FollowConfig, vehicle: VehicleModel, keep_in: KeepIn | None = None) -> None:
+        super().__init__(config.go_to, vehicle, keep_in)
         self._config = config
-        self._go_to = GoTo(config.go_to, vehicle, keep_in)
-        self._held: Goal | None = None
 
-    def reset(self) -> None:
-        """Forget way, disturbances and the last setpoint."""
-        self._go_to.reset()
-        self._held = None
-
-    def setpoint(self, goal: Goal) -> Goal:
-        """Where the leader's pose wants it; the goal before the first update."""
-        return self._held or goal
-
-    def update(
-        self,
-        state: ControlState,
-        goal: Goal,
-        dt_s: float,
-        *,
-        applied: BodyWrench | None = None,
-        neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> BodyWrench:
-        """See `Controller.update`; while the leader is silent the last setpoint is held at rest."""
-        state = state.bounded()
+    def wanted(self, state: ControlState, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
+        """The place beside the leader; None while the leader is silent."""
         leader = neighbours.get(self._config.leader)
-        if leader is not None:
-            self._held = self._beside(leader.bounded(), state, goal.bounded())
-        else:
-            last = self._held or Goal(state.position_table_m, state.heading_rad)
-            self._held = replace(last, velocity_table_m_s=(0.0, 0.0), rate_rad_s=0.0)
-        return self._go_to.update(state, self._held, dt_s, applied=applied)
+        return None if leader is None else self._beside(leader.bounded(), state, goal)
 
     def _beside(self, leader: ControlState, state: ControlState, goal: Goal) -> Goal:
         """Pose and velocity of the place that is to be kept."""

@@ -10,14 +10,13 @@ held at rest.
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from groundstation.control.controller import NO_NEIGHBOURS
-from groundstation.control.go_to import GoTo, GoToConfig
+from groundstation.control.at_setpoint import AtSetpoint
+from groundstation.control.go_to import GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, rotate
+from groundstation.control.state import ControlState, Goal, Vector2, rotate
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -57,44 +56,16 @@ class FormationConfig(BaseModel):
         return self
 
 
-class Formation:
+class Formation(AtSetpoint):
     """Controller row ``formation``."""
 
     def __init__(self, config: FormationConfig, vehicle: VehicleModel, keep_in: KeepIn | None = None) -> None:
+        super().__init__(config.go_to, vehicle, keep_in)
         self._config = config
-        self._go_to = GoTo(config.go_to, vehicle, keep_in)
-        self._held: Goal | None = None
 
-    def reset(self) -> None:
-        """Forget way, disturbances and the last setpoint."""
-        self._go_to.reset()
-        self._held = None
-
-    def setpoint(self, goal: Goal) -> Goal:
-        """Where the neighbours want it; the goal before the first update."""
-        return self._held or goal
-
-    def update(
-        self,
-        state: ControlState,
-        goal: Goal,
-        dt_s: float,
-        *,
-        applied: BodyWrench | None = None,
-        neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
-    ) -> BodyWrench:
-        """See `Controller.update`."""
-        state = state.bounded()
-        setpoint = self._setpoint(goal.bounded(), neighbours)
-        if setpoint is None:
-            # never received of anybody: stay where we are
-            setpoint = self._held or Goal(state.position_table_m, state.heading_rad)
-            setpoint = replace(setpoint, velocity_table_m_s=(0.0, 0.0), rate_rad_s=0.0)
-        self._held = setpoint
-        return self._go_to.update(state, setpoint, dt_s, applied=applied)
-
-    def _setpoint(self, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
+    def wanted(self, state: ControlState, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
         """Weighted mean of what the neighbours and the goal ask for; None when nobody asks."""
+        del state
         asked: list[tuple[float, Goal]] = []
         if self._config.goal_weight > 0.0:
             asked.append((self._config.goal_weight, goal))

@@ -57,7 +57,7 @@ class PathConfig(BaseModel):
         return waypoints_m
 
 
-class Path:
+class PathFollowing:
     """Controller row ``path``.
 
     Raises:

@@ -42,8 +42,12 @@ def load_rig(path: Path, tables: Tables | None = None) -> Rig:
     return parse_rig(read_text(path), path, tables=tables)
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, what: str = "rig file") -> str:
     """The text of a rig file.
+
+    Args:
+        path: Of the file.
+        what: As sentences call it.
 
     Raises:
         RigError: There is no such file, or it is no text.
@@ -51,9 +55,9 @@ def read_text(path: Path) -> str:
     try:
         return text_of(path.read_bytes(), path)
     except FileNotFoundError as error:
-        raise RigError(f"{path}: there is no such rig file") from error
+        raise RigError(f"{path}: there is no such {what}") from error
     except OSError as error:
-        raise RigError(f"{path}: cannot be read as a rig file ({error.strerror})") from error
+        raise RigError(f"{path}: cannot be read as a {what} ({error.strerror})") from error
     except FileError as error:
         raise RigError(str(error)) from error
 

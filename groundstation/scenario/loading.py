@@ -12,11 +12,11 @@ from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.files.reading import path_of
 from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
-from groundstation.rig.read import load_rig, source_of
+from groundstation.rig.read import load_rig, read_text, source_of
 from groundstation.rig.variation import varied
 from groundstation.scenario.compiling import compiled_rig, expanded, groups_of
 from groundstation.scenario.key_trouble import KeyTroubleError
-from groundstation.scenario.scenario_file import ScenarioError, ScenarioFile, parse_content, read_content
+from groundstation.scenario.scenario_file import WHAT, ScenarioError, ScenarioFile, content_of, parse_content
 
 OF_VEHICLE = ("start", "control", "laboratory", "may_land")
 """Keys of a vehicle that are the scenario's; all others are the rig's."""
@@ -98,7 +98,7 @@ def load(path: Path | str) -> Scenario:
         UsageError: One sentence with file and key.
     """
     path = Path(path)
-    return made(read_content(path), path)
+    return made(content_of(read_text(path, WHAT), path), path)
 
 
 def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenario:

@@ -16,10 +16,10 @@ from groundstation.declarations.rig import HoldSection
 from groundstation.declarations.section import Section
 from groundstation.declarations.validation import first_sentence
 from groundstation.files.errors import FileError
-from groundstation.files.reading import text_of
 from groundstation.files.toml_file import toml_of
 from groundstation.scenario.quantities import QUANTITIES
 
+WHAT = "scenario or rig file"
 ALL, FOLLOWERS = "all", "followers"
 """Groups: every vehicle; those whose controllers follow others."""
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
@@ -209,18 +209,14 @@ def is_scenario(content: dict[str, Any]) -> bool:
     return "rig" in content
 
 
-def read_content(path: Path) -> dict[str, Any]:
+def content_of(text: str, path: Path) -> dict[str, Any]:
     """The keys of a scenario or rig file.
 
     Raises:
-        UsageError: There is no such file, or it is no TOML.
+        UsageError: It is no TOML.
     """
     try:
-        return toml_of(text_of(path.read_bytes(), path), path)
-    except FileNotFoundError as error:
-        raise UsageError(f"{path}: there is no such scenario or rig file") from error
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read as a scenario or rig file ({error.strerror})") from error
+        return toml_of(text, path)
     except FileError as error:
         raise UsageError(in_one_line(str(error))) from error
 

@@ -6,6 +6,7 @@ from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.envelope import Delivered
 from groundstation.bus.record_stream import Recorded
 from groundstation.declarations.message import Message
+from groundstation.parts.supervision.accounting import account_for
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.supervision.account import Account, Episode
 
@@ -62,22 +63,8 @@ class FaultSummary:
 
     def _account(self, message: Message) -> None:
         account = self._accounts.get(message.vehicle)
-        if account is None:
-            return
-        t_s = (message.stamp_ns - self._began_ns) * 1e-9
-        match message:
-            case Faults():
-                account.take_faults(
-                    t_s,
-                    message.ids,
-                    message.details,
-                    message.responses,
-                    tuple(gone_ns == 0.0 for gone_ns in message.gone_ns),
-                )
-            case Supervision():
-                account.take_ruling(
-                    t_s, message.mode, message.author, message.cause, is_stop_latched=message.stop_latched
-                )
+        if account is not None:
+            account_for(account, message, (message.stamp_ns - self._began_ns) * 1e-9)
 
 
 def _words(episode: Episode) -> str:

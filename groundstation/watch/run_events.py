@@ -8,6 +8,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.laboratory.messages import InjectedFailure
 from groundstation.parts.scenario.messages import Marker
+from groundstation.parts.supervision.accounting import account_for
 from groundstation.parts.supervision.messages import Faults, StopPress, Supervision
 from groundstation.supervision.account import Account
 from groundstation.supervision.modes import ALOFT
@@ -76,9 +77,7 @@ class EventLog:
                     self._presses.add((message.author, message.press_id))
                     self._mark(t_s, REQUEST, message.vehicle, f"stop pressed by {message.author}")
             case Faults():
-                there = tuple(gone_ns == 0.0 for gone_ns in message.gone_ns)
-                account = self._accounts.setdefault(message.vehicle, Account())
-                account.take_faults(t_s, message.ids, message.details, message.responses, there)
+                account_for(self._accounts.setdefault(message.vehicle, Account()), message, t_s)
             case Supervision():
                 self._mode(message, t_s)
             case Marker():

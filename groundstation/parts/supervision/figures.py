@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.declarations.message import Message
 from groundstation.declarations.view import Array, Figure, Wanted
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.supervision.accounting import account_for
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveCommand
 from groundstation.supervision.account import LONGEST_GAP_S, Account
@@ -38,25 +39,10 @@ class SupervisionFigure(Figure):
         account = Account()
         states = [(t_s, None) for t_s in self._flying_s]
         for t_s, message in sorted([*self._reported, *states], key=lambda row: row[0]):
-            match message:
-                case None:
-                    account.take_state(t_s, "flying")
-                case Faults():
-                    account.take_faults(
-                        t_s,
-                        message.ids,
-                        message.details,
-                        message.responses,
-                        tuple(gone_ns == 0.0 for gone_ns in message.gone_ns),
-                    )
-                case Supervision():
-                    account.take_ruling(
-                        t_s,
-                        message.mode,
-                        message.author,
-                        message.cause,
-                        is_stop_latched=message.stop_latched,
-                    )
+            if message is None:
+                account.take_state(t_s, "flying")
+            else:
+                account_for(account, message, t_s)
         for is_open in self._gates:
             account.take_gate(is_open=is_open)
         return {
