@@ -28,7 +28,7 @@ def spring(state: ControlState, goal: Goal, dt_s: float) -> tuple[float, float, 
 
 
 def main() -> None:
-    """Fly with masses that nobody told the controller of, and compare."""
+    """Fly with masses that the controllers do not know, and compare."""
     plan = scenario.load(SCENARIO)
     for mass_kg in (10.0, 12.0):
         heavier = plan.vary({"laboratory.alpha.mass_kg": mass_kg})

@@ -81,7 +81,7 @@ def camera_of(
         motion: It, smoothed.
         rate_rad_s: (n,) turn rates of its packets without what rounding adds.
         guess_s: Of the delay.
-        progress: Told how it goes.
+        progress: Called with what is being done, and the share that is done.
     """
     found: dict[str, Found] = {}
     unseen: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""What a flight told of a laboratory, what it did not, and what was taken as true."""
+"""What a flight shows of a laboratory, what it did not, and what was taken as true."""
 
 from __future__ import annotations
 

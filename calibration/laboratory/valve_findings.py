@@ -115,19 +115,19 @@ def valve_findings(
     known = []
     for valve in range(VALVES):
         key, force, turn = f"thrusters.{valve}.thrust_n", float(pushes.value[valve]), VALVES + valve
-        told = f"valve {valve} was open for {fit.on_s[valve]:.1f} s in all, {fit.openings[valve]} times"
+        use = f"valve {valve} was open for {fit.on_s[valve]:.1f} s in all, {fit.openings[valve]} times"
         if force > 0.0 and sigma[valve] < WELL_KNOWN * force:
             known.append(valve)
-            found[key] = Found(force * mass_kg, float(sigma[valve]) * mass_kg, "N", told)
+            found[key] = Found(force * mass_kg, float(sigma[valve]) * mass_kg, "N", use)
             found[f"thrust_over_mass.{valve}"] = Found(force, float(sigma[valve]), "m/s^2")
         else:
-            unseen[key] = f"{told}: not enough"
+            unseen[key] = f"{use}: not enough"
         if sigma[turn] < WELL_KNOWN * abs(float(pushes.value[turn])):
             found[f"torque_over_inertia.{valve}"] = Found(
                 float(pushes.value[turn]), float(sigma[turn]), "rad/s^2"
             )
         else:
-            unseen[f"torque_over_inertia.{valve}"] = f"{told}: not enough"
+            unseen[f"torque_over_inertia.{valve}"] = f"{use}: not enough"
     turning = [valve for valve in known if f"torque_over_inertia.{valve}" in found and arms[valve] != 0.0]
     if turning:
         found["inertia_kg_m2"] = _inertia(pushes, mass_kg, arms, turning)

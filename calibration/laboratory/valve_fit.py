@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array
 
+from calibration.laboratory.normal_equations import solved, surer, widened
+from calibration.laboratory.rate_reading import RateReading, read_rates
 from calibration.laboratory.recorded_flight import RecordedFlight
-from calibration.laboratory.rounding import noise_of_poll, rounded
 from calibration.laboratory.scatter import PulseScatter, RateWhitener
 from calibration.laboratory.thrust_course import POLL_S, Openings, Timing
 from calibration.laboratory.valve_columns import (
@@ -38,7 +37,6 @@ from calibration.laboratory.valve_columns import (
     ValveModel,
 )
 from calibration.outcome import CalibrationRefusedError
-from drivers.imu_block.sensors import GYRO_SCALE_RAD_S
 from drivers.valve_bus.messages import VALVES
 from groundstation.cli.progress import Progress
 
@@ -74,21 +72,6 @@ class Spreads:
     rate_rad_s: float = FIRST_RATE_RAD_S
     jitter_s: float = FIRST_JITTER_S
     walk_rad_s: float = FIRST_WALK_RAD_S
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RateReading:
-    """Rates without what rounding did to them.
-
-    Attributes:
-        rate_rad_s: (n,).
-        noise_rad_s: Of one poll before rounding; NaN where it is not known.
-        noise_sigma_rad_s: Of it.
-    """
-
-    rate_rad_s: Array
-    noise_rad_s: float
-    noise_sigma_rad_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,28 +189,6 @@ def fit_valves(flight: RecordedFlight, model: ValveModel, motion: Motion, progre
     )
 
 
-def read_rates(rate_rad_s: Array, fitted_rad_s: Array, scatter_rad_s: float, polls: int) -> RateReading:
-    """Undo what the gyro's converter does to means of polls.
-
-    Args:
-        rate_rad_s: (n,) as read.
-        fitted_rad_s: (n,) near the rates that were.
-        scatter_rad_s: Of the means, about what is expected of them.
-        polls: In a mean.
-    """
-    fitted = fitted_rad_s / GYRO_SCALE_RAD_S
-    variance = (scatter_rad_s / GYRO_SCALE_RAD_S) ** 2
-    noise, slope = noise_of_poll(fitted, variance, polls)
-    if not math.isfinite(noise):
-        return RateReading(rate_rad_s, math.nan, math.nan)
-    found = rounded(fitted, noise)
-    return RateReading(
-        rate_rad_s - GYRO_SCALE_RAD_S * found.bias,
-        GYRO_SCALE_RAD_S * noise,
-        GYRO_SCALE_RAD_S * slope * variance * math.sqrt(2.0 / len(rate_rad_s)),
-    )
-
-
 def _prior(model: ValveModel) -> Array:
     """Information (26,) about the start: valves are not believed at all, the rest hardly."""
     sigma = np.empty(CORE)
@@ -275,18 +236,18 @@ def _step(
     turns = np.hstack([turn, hats[:, 1:]])  # a constant has no differences
     white = whitener(np.column_stack([turns, rate_left]))
     here = np.r_[0:CORE, CORE + 2 * knots : CORE + 3 * knots - 1]
-    normal, right = _widened(normal, right, knots - 1)
+    normal, right = widened(normal, right, knots - 1)
     normal[np.ix_(here, here)] += white[:, :-1].T @ white[:, :-1]
     right[here] += white[:, :-1].T @ white[:, -1]
     normal[:CORE, :CORE] += np.diag(core)
     right[:CORE] += core * (start - value)
-    solution, covariance = _solved(normal, right)
+    solution, covariance = solved(normal, right)
     force_rest = (force_left.T.ravel() - columns @ solution[: columns.shape[1]]).reshape(2, n)
     rate_rest = rate_left - turns @ solution[here]
     moments = pulses.moments(force_rest.ravel())
     force_rest -= moments.moved.reshape(2, n)
     deviation = force_rest / spreads.force_m_s2
-    covariance = _surer(
+    covariance = surer(
         covariance,
         [
             (columns * weight[:, None], force_rest.ravel() * weight, np.tile(stretches, 2)),
@@ -316,36 +277,3 @@ def _at(columns: Array, places: NDArray[np.intp], size: int) -> Array:
     wide = np.zeros((len(columns), size))
     wide[:, places] = columns
     return wide
-
-
-def _surer(covariance: Array, parts: list[tuple[Array, Array, NDArray[np.intp]]]) -> Array:
-    """Widen a covariance to that of scores summed over stretches of flight, which knows what no model does.
-
-    Liang and Zeger, Biometrika 73, 1986.
-
-    Args:
-        covariance: By the model.
-        parts: Whitened columns (m, c), whitened residuals (m,) and the stretch of each row.
-    """
-    scores = np.zeros((1 + max(int(stretch.max()) for _, _, stretch in parts), len(covariance)))
-    for columns, left, stretch in parts:
-        rows = csr_array((left, (stretch, np.arange(len(left)))), shape=(len(scores), len(left)))
-        scores[:, : columns.shape[1]] += np.asarray(rows @ columns)
-    sandwich = covariance @ (scores.T @ scores) @ covariance
-    wider = np.sqrt(np.maximum(1.0, sandwich.diagonal() / covariance.diagonal()))
-    return np.asarray(covariance * np.outer(wider, wider))
-
-
-def _widened(normal: Array, right: Array, more: int) -> tuple[Array, Array]:
-    return np.pad(normal, (0, more)), np.pad(right, (0, more))
-
-
-def _solved(normal: Array, right: Array) -> tuple[Array, Array]:
-    """Return the solution of normal equations and its covariance; unknowns are scaled to one size first."""
-    size = np.sqrt(np.diag(normal))
-    size[size == 0.0] = 1.0
-    scaled = normal / np.outer(size, size)
-    scaled[np.diag_indices_from(scaled)] += 1e-12
-    factor = cho_factor(scaled)
-    covariance = cho_solve(factor, np.eye(len(size))) / np.outer(size, size)
-    return cho_solve(factor, right / size) / size, covariance

@@ -21,7 +21,7 @@ def fly_here(package: Package, runs: Iterable[int], workers: int, take: Take) ->
     """Fly runs.
 
     A worker that dies is replaced, and what was being flown then is flown again, one at a time: a run that
-    takes its worker with it when it is alone is given up, with a row that says so.
+    takes its worker with it when it is alone is given up, with a row for it.
 
     Args:
         package: The campaign.

@@ -37,7 +37,9 @@ def _axis(span: tuple[float, float], label: str) -> list[str]:
     parts = [svg.rectangle(LEFT, TOP, WIDTH - LEFT - 8.0, base - TOP, "frame")]
     for tick in round_ticks(*span, 6):
         parts.append(svg.line(_x(tick, span), TOP, _x(tick, span), base, "grid"))
-        parts.append(svg.text(_x(tick, span), base + 13.0, tick_word(tick), "tick", "middle"))
+        parts.append(
+            svg.text(min(_x(tick, span), WIDTH - 20.0), base + 13.0, tick_word(tick), "tick", "middle")
+        )
     parts.append(svg.text(WIDTH - 8.0, HEIGHT - 5.0, label, "tick", "end"))
     return parts
 

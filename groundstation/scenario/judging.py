@@ -135,7 +135,7 @@ def _went_wrong(scenario: Scenario, log: FlightLog) -> str:
         if rows.mode in UNEXPECTED and not may_land:
             events = [event for event in log.events() if event.vehicle == name and event.kind == "mode"]
             at = f" since {events[-1].t_s:.1f} s ({events[-1].text.partition(': ')[2]})" if events else ""
-            return f"{name} ended {rows.mode}{at}: a scenario says may_land = true where that is right"
+            return f"{name} ended {rows.mode}{at}; give may_land = true where that is right"
     return ""
 
 

@@ -14,7 +14,7 @@ from groundstation.parts.valves.pulses import impulse_ns
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.watch.rig_facts import RigFacts, rig_facts
-from groundstation.watch.run_events import HEARD, EventLog, Mark
+from groundstation.watch.run_events import TAKEN, EventLog, Mark
 from groundstation.watch.summary import VehicleReport, read_reports
 from groundstation.watch.tracks import Array, Track
 
@@ -76,7 +76,7 @@ def read_run(path: Path, tables: Tables) -> FlownRun:
     """
     log = EventLog()
     with Recording(path) as source:
-        reports = read_reports(tables, source, HEARD, log)
+        reports = read_reports(tables, source, TAKEN, log)
         duration_s = (source.stop_ns - source.start_ns) * 1e-9
         info, missing = source.info, tuple(source.missing())
     if not reports:

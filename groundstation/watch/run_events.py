@@ -23,7 +23,7 @@ from groundstation.watch.verdict import (
     Verdict,
 )
 
-HEARD: tuple[type[Message], ...] = (
+TAKEN: tuple[type[Message], ...] = (
     Request, Ack, InjectedFailure, Faults, Supervision, StopPress, Marker,
 )  # fmt: skip
 
@@ -53,7 +53,7 @@ class Mark:
 
 
 class EventLog:
-    """Takes the messages of ``HEARD``, in the order of a recording."""
+    """Takes the messages of ``TAKEN``, in the order of a recording."""
 
     def __init__(self) -> None:
         self._marks: list[Mark] = []
@@ -134,12 +134,12 @@ def with_verdict(marks: list[Mark], verdict: Verdict | None) -> list[Mark]:
     """Marks of the recording, and what else a verdict knows of."""
     if verdict is None:
         return marks
-    told = [
+    added = [
         Mark(event.t_s + verdict.zero_s, None, event.kind, event.vehicle, event.text)
         for event in verdict.events
         if event.kind not in READ_FROM_RECORDING
     ]
-    return sorted([*marks, *told], key=lambda mark: mark.t_s)
+    return sorted([*marks, *added], key=lambda mark: mark.t_s)
 
 
 def _asked(request: Request) -> str:
