@@ -175,7 +175,7 @@ def test_a_payload_that_does_not_fit_its_fields_is_named(rig_of_one, tmp_path, c
 def test_the_traceback_is_there_for_who_asks(where, capsys, monkeypatch):
     monkeypatch.setenv("GROUNDSTATION_DEBUG", "1" if where == "environment" else "")
 
-    def fail(path):
+    def fail(path, what):
         raise NodeError("alpha/rogue raised ValueError")
 
     monkeypatch.setattr(run_command, "read_text", fail)
