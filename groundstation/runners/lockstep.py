@@ -15,6 +15,7 @@ from groundstation.bus.envelope import Delivered
 from groundstation.bus.journal import JournalWriter
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Port
+from groundstation.runners.interrupts import InterruptBetweenSteps
 from groundstation.runners.slot import Sequences, Slot
 from groundstation.runners.step import JOURNAL_PERIOD_NS, Step
 
@@ -74,7 +75,17 @@ class LockstepRunner:
         self.now_ns = 0
 
     def run(self, duration_ns: int, progress: Callable[[int], None] | None = None) -> None:
-        """Run for ``duration_ns`` of virtual time; may be called again to go on."""
+        """Run for ``duration_ns`` of virtual time; may be called again to go on.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C came; the step in which it came is over.
+        """
+        with InterruptBetweenSteps() as interrupt:
+            self._run(duration_ns, progress, interrupt)
+
+    def _run(
+        self, duration_ns: int, progress: Callable[[int], None] | None, interrupt: InterruptBetweenSteps
+    ) -> None:
         until_ns = self.now_ns + duration_ns
         if not self._is_running:
             self._begin()
@@ -85,7 +96,7 @@ class LockstepRunner:
             self._observers,
             self._step.deliver,
         )
-        while True:
+        while not interrupt.is_due:
             next_ns = heap[0][0] if heap else until_ns
             if not self._arrival_known:
                 self._arrival_ns, self._arrival_known = laboratory.next_arrival_ns(), True
@@ -112,6 +123,8 @@ class LockstepRunner:
             if progress is not None and stamp_ns >= report_ns:
                 progress(stamp_ns)
                 report_ns = stamp_ns + 250_000_000
+        if interrupt.is_due:
+            return
         self._arrive(until_ns)
         self.now_ns = until_ns
         self._publish_journal(until_ns)
@@ -175,7 +188,9 @@ class LockstepRunner:
     def _arrive(self, stamp_ns: int) -> None:
         """Advance the laboratory and take what it hands over."""
         self._arrival_known = False
-        for arrival in self._laboratory.advance(stamp_ns):
+        arrivals = self._laboratory.advance(stamp_ns)
+        self.now_ns = stamp_ns  # who ends the run now ends it here
+        for arrival in arrivals:
             port = self._ports.get(arrival.channel)
             if port is not None:
                 self._step.arrive(port, arrival.stamp_ns, arrival.data, arrival.stamp_ns)

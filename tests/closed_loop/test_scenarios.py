@@ -98,7 +98,7 @@ def test_who_ends_a_run_by_hand_gets_no_verdict(file, tmp_path):
             os.sched_yield()
         run.send_signal(signal.SIGINT)
         _, said = run.communicate(timeout=60)
-    assert run.returncode == 3
+    assert run.returncode == 3, said
     assert said == "groundstation: ended by hand, so there is no verdict\n"
     assert record.exists()  # what was flown can be looked at
 
