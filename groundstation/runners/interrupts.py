@@ -7,7 +7,7 @@ from typing import Self
 
 
 class InterruptBetweenSteps:
-    """Holds Ctrl-C back until the step is over, so that nodes, laboratory and recorder agree on what has been.
+    """Holds Ctrl-C back until the step is over, so that nodes, laboratory and recorder agree on the moment.
 
     A second Ctrl-C comes at once. Only Python's own handler is held back, and only in the main thread: who
     has a handler of his own, or runs in another thread, has decided otherwise.

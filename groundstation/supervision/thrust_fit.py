@@ -14,6 +14,8 @@ from groundstation.supervision.thrust_blocks import Block
 _SHUT = 0.02  # a sum of shares below this is no thrust worth learning from
 _WELL_OPEN = 0.3
 _ZERO_KNOWN_M_S2 = 1e-3
+WEAK_GAIN_SIGMA = 0.1
+"""Of what a valve that was named weak gives."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +108,7 @@ class ThrustFit:
         count = len(self.signatures)
         self.gains = [1.0] * count
         self._gain_variances = [config.gain_sigma**2] * count
+        self._weak: dict[int, float] = {}  # gain of a valve that is known to be weak
         self._gain_floor = (0.05 * config.gain_sigma) ** 2
         self._delay_s, self._delay_variance = 0.0, config.delay_sigma_s**2
         self.start((0.0, 0.0))
@@ -126,6 +129,23 @@ class ThrustFit:
         self._given_zero = (self._given_zero[0] + step_m_s2[0], self._given_zero[1] + step_m_s2[1])
         self._zero = (self._zero[0] + step_m_s2[0], self._zero[1] + step_m_s2[1])
         self._zero_variance = self._config.zero_sigma_m_s2**2
+
+    def take_weak(self, valve: int, missing: float) -> None:
+        """Take it that a valve gives less from now on.
+
+        Args:
+            valve: Its number.
+            missing: Share of what it gave before.
+        """
+        self.gains[valve] = self._weak[valve] = self.gains[valve] * (1.0 - missing)
+        self._gain_variances[valve] = WEAK_GAIN_SIGMA**2
+
+    def forget_weak(self) -> None:
+        """Take it that all valves may be healthy."""
+        for valve in self._weak:
+            self.gains[valve] = 1.0
+            self._gain_variances[valve] = self._config.gain_sigma**2
+        self._weak.clear()
 
     @property
     def knows_zero(self) -> bool:
@@ -217,7 +237,9 @@ class ThrustFit:
                 continue
             doubt = self._gain_variances[valve]
             pull = doubt * share / total
-            self.gains[valve] = _within(self.gains[valve] + pull * (sx * x + sy * y), 1.0, config.gain_bound)
+            middle = self._weak.get(valve, 1.0)
+            bound = WEAK_GAIN_SIGMA if valve in self._weak else config.gain_bound
+            self.gains[valve] = _within(self.gains[valve] + pull * (sx * x + sy * y), middle, bound)
             left = 1.0 - pull * share * self.sizes[valve] ** 2
             self._gain_variances[valve] = max(self._gain_floor, left * doubt)
         squared = end_x * end_x + end_y * end_y

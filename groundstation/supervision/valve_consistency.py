@@ -11,11 +11,11 @@ from groundstation.control.vehicle import VehicleModel
 from groundstation.supervision.finding import Finding
 from groundstation.supervision.thrust_blocks import Block, ThrustBlocks
 from groundstation.supervision.thrust_fit import FitConfig, Misfit, ThrustFit
-from groundstation.supervision.valve_hypotheses import BY_ITSELF, Kind, Suspicion, ValveSuspicions
+from groundstation.supervision.valve_hypotheses import Symptom, ValveSuspicions
+from groundstation.supervision.valve_inquiry import SURE, ValveInquiry, Verdict
+from groundstation.supervision.valve_trial import Kind
 
 PUSHED_HOLDS_NS = 2_000_000_000
-_SURE = 7.0
-"""Of two cases the better one is named alone when it is e^7 = 1100 times as likely."""
 _DOUBTED = 3.0
 """A block is not learned from while a fault is that likely; a weak valve is what learning is to find out."""
 _UNEXPLAINED_CHANCE = (0.01, 0.9)
@@ -26,11 +26,9 @@ _HARD_PUSH = 1.7
 _CALM_BLOCKS = 10
 _LONGEST_PUSH_BLOCKS = 50
 """After a shock valves are not accused while forces go on, but not for longer than this."""
-_TURN_KNOWN = 8.0
-"""The gyro has a say about thrust not commanded when it would have given this much evidence."""
 _IS_CONSTANT = 0.95
 
-_evidence, _unbounded = attrgetter("evidence"), attrgetter("unbounded")
+_evidence = attrgetter("evidence")
 LEAST_PUSH_M_S = 0.3e-3
 """In a block; less than a valve gives is explained by a clock that is off, and harms nobody."""
 
@@ -90,8 +88,10 @@ class ValveConsistency:
         self._suspicions = ValveSuspicions(self._fit)
         tests = len(self._suspicions.cases) + 1
         self.threshold = math.log(tests * config.over_s / (config.block_s * config.false_alarm_chance))
+        self._inquiry = ValveInquiry(self._fit, self.threshold, config.block_s, config.wait_s)
         self._largest = max(self._fit.sizes)
         self._valve_findings: tuple[Finding, ...] = ()
+        self._is_settled = False
         self._pushed: tuple[int, Finding] | None = None
         self._shifted: tuple[Finding, ...] = ()
         self._begin()
@@ -99,7 +99,7 @@ class ValveConsistency:
     def _begin(self) -> None:
         self._calm_after = self._pushed_blocks = 0
         self._unexplained = 0.0
-        self._waited = 0
+        self._inquiry.forget()
         self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
 
     def start(self, zero_force_m_s2: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -116,6 +116,8 @@ class ValveConsistency:
     def reset(self) -> None:
         """Forget findings."""
         self._valve_findings = ()
+        self._is_settled = False
+        self._fit.forget_weak()
         self._shifted = ()
         self._pushed = None
         self._suspicions.drop()
@@ -161,7 +163,7 @@ class ValveConsistency:
             size > 4.0 * sigma + _OF_COMMANDED * misfit.commanded_m_s2 and size > _OF_LARGEST * self._largest
         )
         self._watch_odd(block, misfit, is_odd=odd)
-        broken = self._largest if self._valve_findings else 0.0
+        broken = self._largest if self._valve_findings else 0.0  # what a valve that fails gives besides
         if size > _HARD_PUSH * self._largest + broken + misfit.commanded_m_s2 + 6.0 * sigma:
             self._push(stamp_ns, size * block.span_s, "a shock that no valve can give")
             return
@@ -172,7 +174,7 @@ class ValveConsistency:
                 self._calm_after = max(self._calm_after, _CALM_BLOCKS // 2)
             self._fit.lose_rate()
             return
-        if self._valve_findings:
+        if self._is_settled:
             return  # what a second fault would look like beside the first is not worked out
         spoke = self._suspicions.weigh(block, misfit)
         usual, pushed = _UNEXPLAINED_CHANCE
@@ -181,19 +183,39 @@ class ValveConsistency:
         if self._unexplained > self.threshold:
             self._push(stamp_ns, size * block.span_s, "a force that no valve explains")
             return
+        self._inquiry.take(block, misfit)
         worst = max(self._suspicions.cases, key=_evidence)
         if worst.evidence >= self.threshold:
-            self._judge(stamp_ns)
-            return
-        self._waited = 0
-        if worst.evidence < (_SURE if worst.kind is Kind.WEAK else _DOUBTED):
+            self._inquiry.alarm(self._suspicions.cases)
+            self._suspicions.drop()
+        verdict = self._inquiry.verdict()
+        if verdict is not None:
+            self._name(stamp_ns, verdict)
+        elif not self._inquiry.is_open and worst.evidence < (
+            SURE if worst.symptom is Symptom.WEAK else _DOUBTED
+        ):
             self._fit.learn(block, misfit)
+
+    def _name(self, stamp_ns: int, verdict: Verdict) -> None:
+        """Believe it. A valve that is weak may get worse, so what it gives now is taken for known."""
+        best = verdict.best
+        if verdict.is_hand:
+            change_m_s = best.size * self._fit.sizes[best.valve] * self._config.block_s
+            self._push(stamp_ns, change_m_s, "a force that is no valve's")
+            return
+        self._suspicions.drop()
+        self._valve_findings += (verdict.finding(),)
+        if best.kind is Kind.WEAK:
+            self._fit.take_weak(best.valve, best.size)
+        else:
+            self._is_settled = True
 
     def _push(self, stamp_ns: int, change_m_s: float, what: str) -> None:
         detail = f"{what}: {1e3 * change_m_s:.1f} mm/s within {1e3 * self._config.block_s:.0f} ms"
         if change_m_s >= LEAST_PUSH_M_S:
             self._pushed = (stamp_ns, Finding("pushed", detail))
         self._suspicions.drop()
+        self._inquiry.forget()
         self._unexplained = 0.0
         self._calm_after, self._pushed_blocks = _CALM_BLOCKS, 0
         self._fit.lose_rate()
@@ -220,52 +242,4 @@ class ValveConsistency:
         self._shifted = (Finding("imu_shifted", detail),)
         self._fit.shift_zero(mean)
         self._suspicions.drop()
-
-    def _judge(self, stamp_ns: int) -> None:
-        """Name the valve, once there is one case left or the wait is over."""
-        cases = [case for case in self._suspicions.cases if case.evidence >= 0.5 * self.threshold]
-        best = max(cases, key=_unbounded)
-        rivals = [case for case in cases if case.unbounded > best.unbounded - _SURE]
-        by_itself = best.kind in BY_ITSELF
-        if by_itself:
-            # how much thrust is open, its direction is not: a half-open block must not favour small levers
-            alike = [case for case in cases if case.kind in BY_ITSELF]
-            best = max(alike, key=self._suspicions.direction)
-            least = self._suspicions.direction(best) - _SURE
-            rivals = [case for case in rivals if case.kind not in BY_ITSELF]
-            rivals += [case for case in alike if self._suspicions.direction(case) > least]
-        self._waited += 1
-        is_clear = len({case.valve for case in rivals}) == 1 and best.evidence >= self.threshold
-        if by_itself and best.turning < _TURN_KNOWN:
-            is_clear = False  # it may be a hand
-        if not is_clear and self._waited * self._config.block_s < self._config.wait_s:
-            return
-        self._waited = 0
-        turns_otherwise = by_itself and best.turning >= _TURN_KNOWN and best.by_rate < -0.5 * best.turning
-        if turns_otherwise or not self._suspicions.is_along(best):
-            size = math.hypot(best.residual_x, best.residual_y) / max(1, best.blocks)
-            self._push(stamp_ns, size * self._config.block_s, "a force that is no valve's")
-            return
-        self._valve_findings = (_named(best, rivals, self._all_weak()),)
-
-    def _all_weak(self) -> bool:
-        weak = [case for case in self._suspicions.cases if case.kind is Kind.WEAK]
-        return sum(case.evidence > 0.5 * self.threshold for case in weak) >= max(3, len(weak) // 2)
-
-
-def _named(best: Suspicion, rivals: list[Suspicion], all_weak: bool) -> Finding:
-    if best.kind is Kind.WEAK and all_weak:
-        return Finding("valve_weak", "most valves at half thrust or less: supply pressure", "most valves")
-    what = {
-        Kind.CLOSED: "gives no thrust when commanded",
-        Kind.WEAK: "gives half its thrust or less",
-        Kind.OPEN: "gives thrust that was not commanded",
-        Kind.LEAK: "gives a part of its thrust that was not commanded",
-    }[best.kind]
-    kind = Kind.OPEN if best.kind is Kind.LEAK else best.kind
-    whose = f"valve {best.valve}"
-    detail = f"{whose} {what} ({best.thrust_s:.2f} s of it)"
-    others = sorted({f"{case.valve} ({case.kind.value})" for case in rivals if case.valve != best.valve})
-    if others:
-        detail += f"; cannot be told apart from valve {', '.join(others)}"
-    return Finding(kind.value, detail, whose)
+        self._inquiry.forget()

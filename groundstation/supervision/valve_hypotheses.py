@@ -6,38 +6,34 @@ block is a mixture of both. No single block, and no single sensor, adds more tha
 shock proves nothing.
 """
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 
 from groundstation.supervision.thrust_blocks import Block
 from groundstation.supervision.thrust_fit import Misfit, ThrustFit
+from groundstation.supervision.valve_trial import OPENS_CHANCE, STAYS_CHANCE, mixed
 
 WEAK_GAIN = 0.5
 HEALTHY_GAIN = 0.8
 """A valve that was better and is now this good is still called healthy."""
+KNOWN_WEAK_GAIN = 0.6
+"""Below the gain of any healthy valve: this one was named weak before."""
 LEAK_SHARE = 0.15
-OPENS_CHANCE, STAYS_CHANCE = 0.02, 0.95
-"""Of a valve which opens by itself: that it does so in a block, and that it is still open in the next."""
-DIRECTION_SIGMA_RAD = 0.06
-"""Of what the accelerometers read of a valve: 5 mm of the centre of mass, or of the IMU's place."""
 BLOCK_CAP = 8.0
 LEAK_CAP = 1.0
 """A leak stands for small forces that last: half a second of them, not three blocks."""
 
 
-class Kind(Enum):
-    """What is wrong with a valve."""
+class Symptom(Enum):
+    """What a case against a valve looks for."""
 
-    CLOSED = "valve_stuck_closed"
-    WEAK = "valve_weak"
-    OPEN = "valve_stuck_open"
-    LEAK = "leak"
+    CLOSED = "no thrust when commanded"
+    WEAK = "half its thrust"
+    OPEN = "thrust when not commanded"
+    LEAK = "some thrust when not commanded"
 
 
-_OPEN = Kind.OPEN  # found quickly, for each block
-BY_ITSELF = frozenset((Kind.OPEN, Kind.LEAK))
-"""Thrust that was not commanded."""
+_OPEN = Symptom.OPEN  # found quickly, for each block
 
 
 @dataclass(slots=True)
@@ -45,33 +41,20 @@ class Suspicion:
     """The case against one valve.
 
     Attributes:
-        kind: What it would have.
+        symptom: What it looks for.
         valve: Its number.
         evidence: The sum; 0 is none.
-        unbounded: The same sum without caps, to compare cases with each other.
-        thrust_s: Thrust that was missing or too much, as long at full thrust, since the case began.
-        blocks: Number of blocks since then.
-        residual_m_s2: Sum of the residuals that it would explain.
-        variance: Of each component of that sum.
-        by_rate: Part of the gyro in it, without caps.
-        turning: What the gyro would have given for the case if it were true; minus that if nothing turned.
+        blocks: Number of blocks since the case began.
         rate_rad_s: By how much the expected rate would be off now.
         amplitude: Of the block before, as the gyro felt it.
         is_on: Chance that the valve was open in the block before, where it opens by itself.
         cap: The most that a block adds.
     """
 
-    kind: Kind
+    symptom: Symptom
     valve: int
     evidence: float = 0.0
-    unbounded: float = 0.0
-    thrust_s: float = 0.0
     blocks: int = 0
-    residual_x: float = 0.0
-    residual_y: float = 0.0
-    variance: float = 0.0
-    by_rate: float = 0.0
-    turning: float = 0.0
     rate_rad_s: float = 0.0
     amplitude: float = 0.0
     is_on: float = 0.0
@@ -79,9 +62,7 @@ class Suspicion:
 
     def drop(self) -> None:
         """Forget the case."""
-        self.evidence = self.unbounded = self.thrust_s = 0.0
-        self.residual_x = self.residual_y = self.variance = 0.0
-        self.by_rate = self.turning = self.rate_rad_s = self.amplitude = self.is_on = 0.0
+        self.evidence = self.rate_rad_s = self.amplitude = self.is_on = 0.0
         self.blocks = 0
 
 
@@ -97,10 +78,10 @@ class ValveSuspicions:
         self._halves = [0.5 * size**2 for size in fit.sizes]
         self._of_valve = [
             (
-                Suspicion(Kind.CLOSED, valve),
-                Suspicion(Kind.WEAK, valve),
-                Suspicion(Kind.OPEN, valve),
-                Suspicion(Kind.LEAK, valve, cap=LEAK_CAP),
+                Suspicion(Symptom.CLOSED, valve),
+                Suspicion(Symptom.WEAK, valve),
+                Suspicion(Symptom.OPEN, valve),
+                Suspicion(Symptom.LEAK, valve, cap=LEAK_CAP),
             )
             for valve in range(len(fit.gains))
         ]
@@ -128,107 +109,46 @@ class ValveSuspicions:
                 amplitude = whole * (1.0 - share)
                 by_force = (along - half * amplitude) * amplitude / variance
                 if case.evidence > 0.0 or by_force + by_turn > 0.0:
-                    spoke |= self._add(
-                        case, block, misfit, (amplitude, whole * (1.0 - turned)), by_force, by_force
-                    )
+                    spoke |= self._add(case, block, misfit, whole * (1.0 - turned), by_force)
             if share > 0.0 or turned > 0.0 or closed.evidence > 0.0 or weak.evidence > 0.0:
                 healthy = min(0.0, HEALTHY_GAIN - gain) * share
                 usual = (along - half * healthy) * healthy / variance
-                for case, left in ((closed, 0.0), (weak, WEAK_GAIN)):
+                for case, left in ((closed, 0.0), (weak, WEAK_GAIN))[: 2 if gain > KNOWN_WEAK_GAIN else 1]:
                     amplitude = (left - gain) * share
-                    by_force = (along - half * amplitude) * amplitude / variance
-                    if case.evidence > 0.0 or by_force - usual + by_turn > 0.0:
-                        spoke |= self._add(
-                            case,
-                            block,
-                            misfit,
-                            (amplitude, (left - gain) * turned),
-                            by_force,
-                            by_force - usual,
-                        )
+                    by_force = (along - half * amplitude) * amplitude / variance - usual
+                    if case.evidence > 0.0 or by_force + by_turn > 0.0:
+                        spoke |= self._add(case, block, misfit, (left - gain) * turned, by_force)
         return spoke
 
-    def _add(
-        self,
-        case: Suspicion,
-        block: Block,
-        misfit: Misfit,
-        amplitudes: tuple[float, float],
-        by_force: float,
-        over_healthy: float,
-    ) -> bool:
+    def _add(self, case: Suspicion, block: Block, misfit: Misfit, turning: float, by_force: float) -> bool:
         """Add a block to a case; whether it spoke for it.
 
         Args:
             case: Which.
             block: The block.
             misfit: Its residuals.
-            amplitudes: Thrust too much by it, over full thrust: as accelerometers and gyro feel it.
-            by_force: Log-likelihood ratio of the force to what is expected.
-            over_healthy: Likewise to the worst valve that is still called healthy.
+            turning: Thrust too much by it, over full thrust, as the gyro feels it.
+            by_force: Log-likelihood ratio of the force to that of the worst valve still called healthy.
         """
-        amplitude, turning = amplitudes
         cap, rate_variance = case.cap, misfit.rate_variance
         step = 0.5 * self._fit.signatures[case.valve][2] * block.span_s
         idle = case.rate_rad_s + case.amplitude * step
         moved = idle + turning * step
         by_rate = (misfit.rate_rad_s - 0.5 * moved) * moved / rate_variance
-        whole = by_force + by_rate
-        added = min(cap, min(BLOCK_CAP, over_healthy) + by_rate)
-        weight = 1.0
-        if case.kind is _OPEN:
+        added = min(cap, min(BLOCK_CAP, by_force) + by_rate)
+        if case.symptom is _OPEN:
             chance = OPENS_CHANCE + (STAYS_CHANCE - OPENS_CHANCE) * case.is_on
             still = (misfit.rate_rad_s - 0.5 * idle) * idle / rate_variance
-            added, weight = _mixed(min(cap, still), added, chance)
-            whole, _ = _mixed(still, whole, chance)
-            by_rate = weight * by_rate + (1.0 - weight) * still
+            added, weight = mixed(min(cap, still), added, chance)
             moved = weight * moved + (1.0 - weight) * idle
+            turning, case.is_on = weight * turning, weight
         if case.evidence + added <= 0.0:
             if case.evidence > 0.0:
                 case.drop()
+            case.is_on = 0.0
             return False
         case.evidence += added
-        case.unbounded += whole
         case.blocks += 1
-        case.thrust_s += abs(weight * amplitude) * block.span_s
-        if amplitude:
-            case.residual_x += weight * misfit.force_m_s2[0]
-            case.residual_y += weight * misfit.force_m_s2[1]
-            case.variance += weight * misfit.force_variance
-        case.by_rate += by_rate
-        case.turning += 0.5 * moved * moved / rate_variance
         case.rate_rad_s = (1.0 - misfit.rate_gain) * moved
-        case.amplitude = weight * turning
-        case.is_on = weight
+        case.amplitude = turning
         return added > 0.0
-
-    def direction(self, case: Suspicion) -> float:
-        """Log-likelihood of where the thrust of the case points, whatever its size, and of its turning."""
-        sx, sy, _ = self._fit.signatures[case.valve]
-        size = self._fit.sizes[case.valve]
-        along = (case.residual_x * sx + case.residual_y * sy) / size
-        across = (case.residual_x * sy - case.residual_y * sx) / size
-        variance = case.variance + (DIRECTION_SIGMA_RAD * along) ** 2
-        return case.by_rate - 0.5 * across * across / variance
-
-    def is_along(self, case: Suspicion) -> bool:
-        """Whether what the case explains points where its valve pushes."""
-        sx, sy, _ = self._fit.signatures[case.valve]
-        size = self._fit.sizes[case.valve]
-        along = abs(case.residual_x * sx + case.residual_y * sy) / size
-        across = abs(case.residual_x * sy - case.residual_y * sx) / size
-        return across <= 0.35 * along + 3.0 * math.sqrt(case.variance)
-
-
-def _mixed(off: float, on: float, chance: float) -> tuple[float, float]:
-    """Log-likelihood ratio of a block that is on with that chance, and the chance after it.
-
-    Args:
-        off: Log-likelihood ratio if it is off.
-        on: Likewise if it is on.
-        chance: Before the block, between 0 and 1.
-    """
-    off, on = off + math.log(1.0 - chance), on + math.log(chance)
-    high, low = max(off, on), min(off, on)
-    total = high + math.log1p(math.exp(low - high))
-    return total, math.exp(on - total)

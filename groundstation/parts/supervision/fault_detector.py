@@ -1,7 +1,6 @@
 """Fault detector: what the flight process sees wrong with sensors, fixes and valves of its vehicle."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
@@ -26,21 +25,8 @@ LONGEST_HOLE_MS, DISTURBED_NS = 60, 2_000_000_000
 """After a longer hole between samples nothing is judged for a while: filter and stamps settle."""
 MOST_BEHIND, COUNTER_MODULUS = 3, 16
 """Commands, 20 ms each, that the node may be behind."""
-WITNESS_NS = 10_000_000_000
-"""So long the first finding about a valve waits for a second one that agrees."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
-PUSHED = "pushed"
-
-
-class _Suspect(NamedTuple):
-    """What was found about a valve, once."""
-
-    whose: str
-    since_ns: int
-
-
-_NOBODY = _Suspect("", 0)
 
 
 class FaultDetector(Node):
@@ -79,7 +65,6 @@ class FaultDetector(Node):
         self._floats_from_ns: int | None = None
         self._node_ns = self._sent = 0
         self._disturbed_ns = -DISTURBED_NS
-        self._suspect = _NOBODY
         self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
         self._published: tuple[str, ...] = ()
         self._published_ns = 0
@@ -125,7 +110,6 @@ class FaultDetector(Node):
             self._valves.start(self._zeros[1])
         elif not ruling.air_on and self._floats_from_ns is not None:
             self._floats_from_ns = None
-            self._suspect = _NOBODY
             self._valves.reset()
             self._imu.reset()
 
@@ -149,25 +133,11 @@ class FaultDetector(Node):
         if now_ns - self._node_ns > NODE_NS:
             self._begin_again()
             return False
-        if not self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2):
-            return False
-        return self._is_witnessed(now_ns)
+        return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
 
     def _begin_again(self) -> None:
         self._valves.reset()
         self._valves.start(self._zeros[1])
-
-    def _is_witnessed(self, now_ns: int) -> bool:
-        """Whether a finding about a valve is the second one: timing that is off for once names none twice."""
-        for finding in self._valves.findings(now_ns):
-            if finding.id == PUSHED:
-                continue
-            whose = finding.whose or finding.id  # closed or weak: the same valve is what counts
-            before, self._suspect = self._suspect, _Suspect(whose, now_ns)
-            if before.whose != whose or now_ns - before.since_ns > WITNESS_NS:
-                self._begin_again()
-                return False
-        return True
 
     def _fix(self, fix: PoseFix, now_ns: int) -> None:
         if not fix.fix:
@@ -190,7 +160,8 @@ class FaultDetector(Node):
         found = dict(self._imu_watch.findings(now_ns))
         found.update(self._fix_watch.findings(now_ns))
         for finding in (*self._valves.findings(now_ns), *self._imu.findings):
-            found[finding.id] = finding.detail
+            before = found.get(finding.id)
+            found[finding.id] = finding.detail if before is None else f"{before}; {finding.detail}"
         ids = tuple(found)
         if ids != self._published or now_ns - self._published_ns >= REPEAT_NS:
             self._published, self._published_ns = ids, now_ns

@@ -49,25 +49,30 @@ def test_a_run_that_is_interrupted_anywhere_closes_in_good_order(where, calls):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_second_one_comes_at_once():
-    after = False
-    with pytest.raises(KeyboardInterrupt), InterruptBetweenSteps() as interrupt:
-        signal.raise_signal(signal.SIGINT)
+def struck(times, error=None):
+    """A step in which Ctrl-C comes so many times."""
+    with InterruptBetweenSteps() as interrupt:
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
         assert interrupt.is_due
-        signal.raise_signal(signal.SIGINT)
-        after = True
-    assert not after
+        assert times == 1, "the second one did not come at once"
+        if error is not None:
+            raise error
+
+
+def test_a_second_one_comes_at_once():
+    with pytest.raises(KeyboardInterrupt):
+        struck(2)
 
 
 def test_one_that_came_in_the_last_step_is_not_lost():
-    with pytest.raises(KeyboardInterrupt), InterruptBetweenSteps():
-        signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        struck(1)
 
 
 def test_an_error_of_the_run_goes_before_it():
-    with pytest.raises(ValueError, match="the laboratory"), InterruptBetweenSteps():
-        signal.raise_signal(signal.SIGINT)
-        raise ValueError("the laboratory")
+    with pytest.raises(ValueError, match="the laboratory"):
+        struck(1, ValueError("the laboratory"))
 
 
 def test_a_handler_of_somebody_else_stays_in_force():

@@ -8,7 +8,8 @@ import pytest
 from groundstation.control.vehicle import VehicleModel
 from groundstation.supervision.thrust_blocks import ThrustBlocks
 from groundstation.supervision.thrust_fit import FitConfig, ThrustFit
-from groundstation.supervision.valve_hypotheses import Kind, ValveSuspicions
+from groundstation.supervision.valve_hypotheses import Symptom, ValveSuspicions
+from groundstation.supervision.valve_trial import Kind, ValveTrial
 
 MS = 1_000_000
 FAULT_S = 8.0
@@ -59,14 +60,21 @@ def test_a_block_adds_the_log_likelihood_ratio(air):
     fit.compare(first)
     misfit = fit.compare(second)
     assert suspicions.weigh(second, misfit)
-    closed = next(case for case in suspicions.cases if case.kind is Kind.CLOSED and case.valve == 0)
-    by_force = 0.5 * fit.sizes[0] ** 2 / 1e-6
+    closed = next(case for case in suspicions.cases if case.symptom is Symptom.CLOSED and case.valve == 0)
     turn = 0.5 * 0.132 * 0.02  # mean of a block at whose beginning the thrust sets in
-    by_rate = 0.5 * turn**2 / misfit.rate_variance
     assert misfit.rate_rad_s == pytest.approx(turn)
-    assert closed.unbounded == pytest.approx(by_force + by_rate)
     assert closed.evidence == 8.0
-    assert max(suspicions.cases, key=lambda case: case.unbounded) is closed
+    # what a trial makes of the same block, with nothing capped and the best size
+    trial = ValveTrial(fit, [(1, second, misfit)], [1], [1], 1.0)
+    best, *others = trial.explanations()
+    assert (best.kind, best.valve, best.size) == (Kind.CLOSED, 0, pytest.approx(1.0))
+    by_force = 0.5 * fit.sizes[0] ** 2 / 1e-6
+    by_rate = 0.5 * turn**2 / misfit.rate_variance
+    assert best.likelihood == pytest.approx(by_force + by_rate)
+    assert (best.turning, best.by_rate) == pytest.approx((by_rate, by_rate))
+    # while it alone is commanded, the opposite valve, open, would do the same, and so would an empty tank
+    alike = {(each.kind, each.valve) for each in others if each.likelihood > best.likelihood - 1e-6}
+    assert alike == {(Kind.OPEN, 2), (Kind.SUPPLY, -1)}
 
 
 def test_a_rise_and_a_lag_keep_the_impulse_and_move_it(air):
