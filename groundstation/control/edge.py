@@ -11,7 +11,13 @@ from typing import NamedTuple
 
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import ControlState
+from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
+RELIED_ON = 0.9
+"""Of the nominal thrust: spread and sag of the valves."""
+SLOPE_M_S2 = 0.005
+"""A table half a milliradian off level."""
 _SLOWEST_BRAKING_M_S2 = 1e-6  # a division guard: with no authority every motion is too late
 
 
@@ -37,6 +43,11 @@ class EdgeOutlook(NamedTuple):
     room_m: float
     stopping_distance_m: float
     time_to_edge_s: float
+
+
+def braking_to_count_on(model: VehicleModel, envelope: WrenchEnvelope) -> float:
+    """Deceleration (m/s^2) that the valves give in whatever direction it is needed; at least 0."""
+    return max(0.0, RELIED_ON * envelope.max_force_n / model.mass_kg - SLOPE_M_S2)
 
 
 def edge_outlook(

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from groundstation.control.allocation import Allocator
 from groundstation.control.state import BodyWrench
+from groundstation.control.wrench_envelope import WrenchEnvelope
 
 MS_PER_S = 1000.0
 MAX_ON_MS = 127  # seven bits on the wire
@@ -73,6 +74,11 @@ class PulseModulator:
         effect = np.abs(allocator.effectiveness).max(axis=1)
         self._carry_limit_ms = CARRIED_PULSES * self._min_on_ms * effect
         self.reset()
+
+    @property
+    def envelope(self) -> WrenchEnvelope:
+        """What the valves can make."""
+        return self._allocator.envelope
 
     def reset(self) -> None:
         """Forget the carried rest; all valves are taken to be closed."""

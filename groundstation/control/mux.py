@@ -1,8 +1,9 @@
-"""Who may command the valves: brake > operator > controller, each only while it is fresh.
+"""Who may command: brake > operator > outside > controller, each only while it is fresh.
 
 Ages are judged by arrival stamps against the stamp of the question, never by stamps inside messages. Silence
 of the controller brakes, for closed valves on a frictionless table mean coasting; braking needs a state,
-carried on by the model for a while where none comes, so without one all valves close.
+carried on by the model for a while where none comes, so without one all valves close. Who commands from
+outside has the vehicle until a person gives it back: his silence brakes, too, and the controller waits.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ class Source(StrEnum):
 
     BRAKE = "brake"
     OPERATOR = "operator"
+    OUTSIDE = "outside"
     CONTROLLER = "controller"
     CLOSED = "closed"
 
@@ -29,14 +31,16 @@ class MuxConfig(BaseModel):
 
     Attributes:
         operator_s: The operator's demands.
-        controller_s: The controller's.
+        outside_s: Those of a program outside the station.
+        controller_s: The controller's; with the bus and the valves braking pushes within 0.3 s.
         state_s: A state to brake on; longer than a controller may fly by, for the brake law carries it on.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     operator_s: float = Field(default=0.3, gt=0.0)
-    controller_s: float = Field(default=0.3, gt=0.0)
+    outside_s: float = Field(default=0.24, gt=0.0)
+    controller_s: float = Field(default=0.24, gt=0.0)
     state_s: float = Field(default=2.0, gt=0.0)
 
 
@@ -63,6 +67,7 @@ class CommandMux(Generic[Demand]):
     def __init__(self, config: MuxConfig) -> None:
         self._lifetime_ns = {
             Source.OPERATOR: round(config.operator_s * NS_PER_S),
+            Source.OUTSIDE: round(config.outside_s * NS_PER_S),
             Source.CONTROLLER: round(config.controller_s * NS_PER_S),
         }
         self._state_lifetime_ns = round(config.state_s * NS_PER_S)
@@ -70,6 +75,7 @@ class CommandMux(Generic[Demand]):
         self._demands: dict[Source, Demand] = {}
         self._unused: set[Source] = set()
         self._state_arrival_ns: int | None = None
+        self._is_outside = False
 
     def operate(self, demand: Demand, arrival_ns: int) -> None:
         """Take a demand of the operator; to be repeated as long as it is wanted."""
@@ -78,6 +84,16 @@ class CommandMux(Generic[Demand]):
     def control(self, demand: Demand, arrival_ns: int) -> None:
         """Take a demand of the controller."""
         self._offer(Source.CONTROLLER, demand, arrival_ns)
+
+    def command_from_outside(self, demand: Demand, arrival_ns: int) -> None:
+        """Take a demand of a program outside; from the first one on the vehicle is its."""
+        self._offer(Source.OUTSIDE, demand, arrival_ns)
+        self._is_outside = True
+
+    def give_back(self) -> None:
+        """The controller flies it again."""
+        self._is_outside = False
+        self._arrival_ns.pop(Source.OUTSIDE, None)
 
     def forget(self) -> None:
         """Forget demands: those that were made before valves may open do not come to life then."""
@@ -89,12 +105,13 @@ class CommandMux(Generic[Demand]):
 
     def select(self, stamp_ns: int) -> Selection[Demand]:
         """Who commands at this moment, and why."""
-        for source in (Source.OPERATOR, Source.CONTROLLER):
+        flown_by = Source.OUTSIDE if self._is_outside else Source.CONTROLLER
+        for source in (Source.OPERATOR, flown_by):
             if self._is_fresh(source, stamp_ns):
                 is_new = source in self._unused
                 self._unused.discard(source)
                 return Selection(source, self._demands[source], is_new, f"{source.value} is fresh")
-        return self.brake(stamp_ns, self._silence(stamp_ns))
+        return self.brake(stamp_ns, self._silence(flown_by, stamp_ns))
 
     def brake(self, stamp_ns: int, reason: str) -> Selection[Demand]:
         """Brake while there is a state to brake on; else all valves close."""
@@ -115,11 +132,11 @@ class CommandMux(Generic[Demand]):
         arrival_ns = self._arrival_ns.get(source)
         return arrival_ns is not None and stamp_ns - arrival_ns <= self._lifetime_ns[source]
 
-    def _silence(self, stamp_ns: int) -> str:
-        arrival_ns = self._arrival_ns.get(Source.CONTROLLER)
+    def _silence(self, source: Source, stamp_ns: int) -> str:
+        arrival_ns = self._arrival_ns.get(source)
         if arrival_ns is None:
-            return "nothing received from the controller yet"
-        return f"controller silent for {_ms(stamp_ns - arrival_ns)} ms"
+            return f"nothing received from the {source.value} yet"
+        return f"{source.value} silent for {_ms(stamp_ns - arrival_ns)} ms"
 
 
 def _ms(span_ns: int) -> int:

@@ -26,7 +26,7 @@ from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.parts.operation.messages import Latency
 from groundstation.parts.stars.messages import StarFix, StarSpots
-from groundstation.parts.valves.messages import CanOut, ValveCommand, ValveDemand, ValveSelection
+from groundstation.parts.valves.messages import CanOut, ValveCommand, ValveSelection
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -45,8 +45,7 @@ _READ: Mapping[str, type[Message]] = {
 _BEFORE: Mapping[type[Message], type[Message]] = {
     Imu: ImuBytes,
     Wrench: VehicleState,
-    ValveDemand: Wrench,
-    ValveSelection: ValveDemand,
+    ValveSelection: Wrench,
     ValveCommand: ValveSelection,
     CanOut: ValveCommand,
 }

@@ -87,7 +87,7 @@ def test_parts_shows_the_topics_the_node_and_its_process(own_package):
         ["range_finder", "range", "10/s", "range_reader", "*_range_finder", ""]
     ]
     (wrench,) = rows_of(done.stdout, "wrench")
-    assert wrench[3:] == ["controller", "*_controller", "allocation (*_flight)"]
+    assert wrench[3:] == ["controller", "*_controller", "supervisor (commands), command_mux (commands)"]
 
 
 def test_the_flight_is_flown_by_the_controller_of_the_package(flown):

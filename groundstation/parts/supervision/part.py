@@ -1,5 +1,6 @@
 """Part ``supervision``: one supervisor per vehicle rules on valves and float air; faults move it."""
 
+from groundstation.control.edge import braking_to_count_on
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
@@ -27,14 +28,12 @@ from groundstation.supervision.valve_consistency import ValveConsistency, ValveC
 
 NODE_FRAMES_HZ, SPARE_FRAMES_HZ = 60.0, 100.0
 """What a valve node sends a second, and what others may send besides."""
-RELIED_ON = 0.9  # of the nominal thrust: spread and sag of the valves
 HEADING_SIGMA_RAD = 0.002  # of fixes that are no camera's
-SLOPE_M_S2 = 0.005  # a table half a milliradian off level
 
 
 def _supervisor(rig: Rig, vehicle: str) -> Node:
     model = rig.type_of(vehicle).model()
-    braking_m_s2 = RELIED_ON * WrenchEnvelope(model).max_force_n / model.mass_kg - SLOPE_M_S2
+    braking_m_s2 = braking_to_count_on(model, WrenchEnvelope(model))
     sightings = Sightings(
         rig.table.keep_in(),
         braking_m_s2,

@@ -7,12 +7,13 @@ from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.memory import memory_of
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
-from groundstation.parts.valves.messages import ValveDemand, ValveStatus
+from groundstation.parts.valves.messages import ValveStatus
 from groundstation.supervision.modes import Event
 from groundstation.supervision.sightings import NodeSeen, Seen
 from groundstation.supervision.supervisor import Ruling, Supervisor
@@ -33,7 +34,7 @@ class SupervisorNode(Node):
     """
 
     inputs = (
-        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveDemand, Findings,
+        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, Wrench, Findings,
         RecorderStatus, Diagnostics,
     )  # fmt: skip
     paced = (VehicleState,)
@@ -114,7 +115,7 @@ class SupervisorNode(Node):
                     message.faults,
                     message.bus_rate_hz,
                 )
-            case ValveDemand():
+            case Wrench():
                 sightings.demand_ns = now_ns
             case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
                 sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns

@@ -1,137 +1,141 @@
-"""Command multiplexer: who may command the valves, by the law that the supervisor rules."""
+"""Command multiplexer: chooses who commands, filters for safety, allocates to the valves."""
 
 from collections.abc import Iterator
 
-from groundstation.control.brake import BrakeConfig, brake_wrench, dead_reckoned
+from groundstation.control.braking import Braking
+from groundstation.control.edge import braking_to_count_on, edge_outlook
 from groundstation.control.modulation import PulseModulator
-from groundstation.control.mux import CommandMux, MuxConfig, Selection, Source
-from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState
+from groundstation.control.mux import CommandMux, Selection, Source
+from groundstation.control.safety_filter import SafetyFilter, body_force, table_acceleration
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, clamp
+from groundstation.control.surroundings import Surroundings
 from groundstation.control.vehicle import VehicleModel
-from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.declarations.request import Ack, Request, answer
+from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.actions import PUSH
-from groundstation.parts.valves.messages import ValveDemand, ValveSelection
+from groundstation.parts.valves.hand_push import HandPush
+from groundstation.parts.valves.messages import Outlook, ValveDemand, ValveSelection
+from groundstation.supervision.clearance import clearance
 from groundstation.supervision.modes import Law
 
 PERIOD_NS = 20_000_000
 CLOSED = bytes(8)
 RULING_NS = 500_000_000
 """A ruling older than this is none: the supervisor is silent."""
+OUTLOOK_EVERY = 5
+KNOWN_PLACES = frozenset({"flying", "resting", "lost"})
+"""Of the states of an estimator: those in which the place that it reports means something."""
 
 
 class CommandMuxNode(Node):
-    """Publishes every 20 ms, and at once on a new demand, what the valves are to do and who wants it.
+    """Publishes every 20 ms, and at once on a new wrench, what the valves are to do and who wants it.
 
     Args:
         vehicle: Its name.
-        config: How long each source stays fresh.
-        brake: The brake law.
-        model: Mass properties and valves.
-        modulators: Two, for braking and for pushing by hand, apart from that of the controller.
+        others: The other vehicles.
+        choice: Who may command.
+        braking: The brake law.
+        safety: The filter behind every source but the brake.
+        surroundings: Obstacles, and where the others are.
+        model: Mass properties.
+        modulator: Makes pulses.
     """
 
-    inputs = (ValveDemand, VehicleState, Supervision, Request, Lease)
+    inputs = (Wrench, VehicleState, Supervision, Request, Lease)
     paced = (VehicleState,)
-    outputs = (ValveSelection, Ack)
-    trigger = ValveDemand
+    outputs = (ValveDemand, ValveSelection, Outlook, Ack)
+    trigger = Wrench
 
     def __init__(
         self,
         vehicle: str,
-        config: MuxConfig,
-        brake: BrakeConfig,
+        others: tuple[str, ...],
+        choice: CommandMux[BodyWrench],
+        braking: Braking,
+        safety: SafetyFilter,
+        surroundings: Surroundings,
         model: VehicleModel,
-        modulators: tuple[PulseModulator, PulseModulator],
+        modulator: PulseModulator,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self._choice: CommandMux[bytes] = CommandMux(config)
-        self._brake = brake
+        self._others = others
+        self._choice, self._braking, self._safety = choice, braking, safety
+        self._surroundings = surroundings
         self._model = model
-        self._envelope = WrenchEnvelope(model)
-        self._modulator, self._hand = modulators
-        self._period_ns = round(self._modulator.config.period_s * 1e9)
-        self._brake_due_ns = 0
+        self._modulator = modulator
+        self._period_ns = round(modulator.config.period_s * 1e9)
+        self._due_ns = 0
+        self._hand = HandPush(self._period_ns)
         self._ruling: Supervision | None = None
         self._ruling_ns = 0
         self._lease = LeaseCheck()
-        self._push: BodyWrench | None = None
-        self._push_until_ns = self._push_due_ns = 0
-        self._state: ControlState | None = None
-        self._state_ns = 0
-        self._braked_with = NO_WRENCH
-        self._counter = self._pulse_id = 0
+        self._sigma_m = (0.0, 0.0)
+        self._counter = self._pulse_id = self._ticks = 0
         self._on_time_ms = CLOSED
         self._source: Source | None = None
+        self._limited_by = ""
+
+    def sources(self, payload: type[Message]) -> tuple[str, ...]:
+        return (self.vehicle, *self._others) if payload is VehicleState else (self.vehicle,)
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
-            case ValveDemand():
-                self._choice.control(message.on_time_ms, now_ns)
-                yield self._select(now_ns)
-            case VehicleState(status="flying"):
-                self._state = ControlState(
-                    message.position_table_m,
-                    message.velocity_table_m_s,
-                    message.heading_rad,
-                    message.rate_rad_s,
-                )
-                self._state_ns = now_ns
-                self._choice.receive_state(now_ns)
+            case Wrench():
+                wrench = BodyWrench((message.force_x_n, message.force_y_n), message.torque_z_nm)
+                self._choice.control(wrench, now_ns)
+                yield from self._select(now_ns)
+            case VehicleState():
+                self._see(message, now_ns)
             case Supervision():
                 yield from self._obey(message, now_ns)
             case Lease():
                 self._lease.take(message)
             case Request(action="resume") if not self._lease.objection(message, now_ns):
-                self._push = None
+                self._hand.end()
             case Request() if message.action == PUSH.name:
-                yield answer(message, now_ns, self._begin_push(message, now_ns))
+                refusal = self._lease.objection(message, now_ns)
+                refusal = refusal or self._hand.begin(message, self._ruling, now_ns)
+                if not refusal:
+                    self._modulator.reset()
+                yield answer(message, now_ns, refusal)
 
     def tick(self, now_ns: int) -> Iterator[Message]:
-        if self._push is not None:
-            self._pushing(self._push, now_ns)
-        yield self._select(now_ns)
+        push, is_over = self._hand.due(now_ns)
+        if push is not None or is_over:
+            self._choice.operate(push or NO_WRENCH, now_ns)
+        yield from self._select(now_ns)
+        self._ticks += 1
+        if self._ticks % OUTLOOK_EVERY == 0 and self._braking.state is not None:
+            yield self._look_ahead(self._braking.state, now_ns)
+
+    def _see(self, message: VehicleState, now_ns: int) -> None:
+        if message.status not in KNOWN_PLACES:
+            return
+        state = ControlState(
+            message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
+        )
+        is_flown = message.status == "flying"
+        sigma_m = message.pose_sigma[:2]
+        if message.vehicle != self.vehicle:
+            self._surroundings.see(message.vehicle, state, sigma_m, now_ns, is_flown=is_flown)
+        elif is_flown:
+            self._sigma_m = sigma_m
+            self._braking.take(state, now_ns)
+            self._choice.receive_state(now_ns)
 
     def _obey(self, ruling: Supervision, now_ns: int) -> Iterator[Message]:
         before, self._ruling, self._ruling_ns = self._ruling, ruling, now_ns
         if before is None or before.law != ruling.law:
-            self._push = None
+            self._hand.end()
             self._choice.forget()
-            yield self._select(now_ns)
+            yield from self._select(now_ns)
 
-    def _begin_push(self, request: Request, now_ns: int) -> str:
-        """Push by hand from now on; the reason if it cannot be done."""
-        refusal = self._lease.objection(request, now_ns)
-        if refusal:
-            return refusal
-        try:
-            given = PUSH.read(request)
-        except ArgumentError as error:
-            return str(error)
-        if self._ruling is None or self._ruling.law != Law.CONTROLLER:
-            mode = "waiting for its supervisor" if self._ruling is None else self._ruling.mode
-            return f"only a flying vehicle can be pushed, it is {mode}"
-        self._push = BodyWrench(
-            (float(given["force_x_n"]), float(given["force_y_n"])), float(given["torque_nm"])
-        )
-        self._push_until_ns, self._push_due_ns = now_ns + round(float(given["span_s"]) * 1e9), now_ns
-        self._hand.reset()
-        return ""
-
-    def _pushing(self, push: BodyWrench, now_ns: int) -> None:
-        """Keep the operator's demand fresh, a new pulse each period, until the push has lasted."""
-        if now_ns >= self._push_until_ns:
-            self._push = None
-            self._choice.operate(CLOSED, now_ns)
-        elif now_ns >= self._push_due_ns:
-            self._choice.operate(bytes(self._hand.update(push).on_time_ms), now_ns)
-            self._push_due_ns += self._period_ns
-
-    def _choose(self, now_ns: int) -> Selection[bytes]:
+    def _choose(self, now_ns: int) -> Selection[BodyWrench]:
         ruling = self._ruling
         if ruling is None or now_ns - self._ruling_ns > RULING_NS:
             return Selection(Source.CLOSED, None, False, "nothing comes from the supervisor")
@@ -142,47 +146,25 @@ class CommandMuxNode(Node):
                 return self._choice.brake(now_ns, f"{ruling.mode}: {ruling.cause}")
         return Selection(Source.CLOSED, None, False, f"{ruling.mode}: {ruling.cause}")
 
-    def _select(self, now_ns: int) -> ValveSelection:
+    def _select(self, now_ns: int) -> Iterator[Message]:
         selection = self._choose(now_ns)
         changed = selection.source is not self._source
         self._source = selection.source
-        if selection.source is Source.BRAKE:
-            self._braking(now_ns, changed=changed)
-        elif selection.demand is None:
+        if changed:  # what another source was owed is of no use to this one
+            self._modulator.reset()
+            self._due_ns = now_ns
+            self._limited_by = ""
+        if selection.source is Source.CLOSED:
             if changed:
                 self._pulse(CLOSED)
+        elif selection.source is Source.BRAKE:
+            if now_ns >= self._due_ns:
+                self._due_ns += self._period_ns
+                yield from self._make(self._braking.wrench(now_ns), now_ns)
         elif selection.is_new or changed:
-            self._pulse(selection.demand)
-        return self._say(selection, now_ns)
-
-    def _braking(self, now_ns: int, *, changed: bool) -> None:
-        if changed:
-            self._modulator.reset()
-            self._brake_due_ns = now_ns
-            self._braked_with = NO_WRENCH
-        if now_ns < self._brake_due_ns or self._state is None:
-            return
-        wrench = brake_wrench(self._carried(self._state, now_ns), self._brake, self._model, self._envelope)
-        pulses = self._modulator.update(wrench)
-        self._braked_with = pulses.delivered
-        self._pulse(bytes(pulses.on_time_ms))
-        self._brake_due_ns += self._period_ns
-
-    def _carried(self, state: ControlState, now_ns: int) -> ControlState:
-        """The newest state; where none came for longer than a period, what the pulses have made of it."""
-        if now_ns - self._state_ns <= self._period_ns:
-            return state
-        period_s = self._period_ns * 1e-9
-        self._state = dead_reckoned(state, self._braked_with, period_s, self._model)
-        return self._state
-
-    def _pulse(self, on_time_ms: bytes) -> None:
-        self._on_time_ms = on_time_ms
-        self._pulse_id = (self._pulse_id + 1) % 16
-
-    def _say(self, selection: Selection[bytes], now_ns: int) -> ValveSelection:
+            yield from self._make(selection.demand, now_ns)
         self._counter = (self._counter + 1) % 16
-        return ValveSelection(
+        yield ValveSelection(
             now_ns,
             self.vehicle,
             self._counter,
@@ -191,3 +173,70 @@ class CommandMuxNode(Node):
             selection.source.value,
             selection.reason,
         )
+
+    def _make(self, wanted: BodyWrench | None, now_ns: int) -> Iterator[Message]:
+        """Pulses for what is wanted, as far as it is safe."""
+        if wanted is None:
+            return
+        safe = wanted if self._source is Source.BRAKE else self._filtered(wanted, now_ns)
+        pulses = self._modulator.update(safe)
+        self._braking.deliver(pulses.delivered)
+        self._pulse(bytes(pulses.on_time_ms))
+        yield ValveDemand(
+            now_ns,
+            self.vehicle,
+            self._on_time_ms,
+            str(self._source),
+            wanted.force_body_n,
+            wanted.torque_nm,
+            self._limited_by,
+            pulses.delivered.force_body_n,
+            pulses.delivered.torque_nm,
+        )
+
+    def _filtered(self, wanted: BodyWrench, now_ns: int) -> BodyWrench:
+        state, envelope = self._braking.state, self._braking.envelope
+        if state is None:
+            self._limited_by = "no state"
+            return NO_WRENCH
+        makeable = envelope.saturate(wanted)
+        found = self._safety.filtered(
+            table_acceleration(makeable, state.heading_rad, self._model.mass_kg),
+            state,
+            self._surroundings.discs(self._sigma_m, now_ns, frozenset()),
+            braking_to_count_on(self._model, envelope),
+        )
+        self._limited_by = ", ".join(found.limited_by)
+        if not found.limited_by:
+            return wanted
+        if found.must_brake:
+            return self._braking.wrench(now_ns) or NO_WRENCH
+        force = body_force(found.acceleration_table_m_s2, state.heading_rad, self._model.mass_kg)
+        torque = clamp(makeable.torque_nm, self._safety.config.torque_share * envelope.max_torque_nm)
+        return envelope.saturate(BodyWrench(force, torque))
+
+    def _look_ahead(self, state: ControlState, now_ns: int) -> Outlook:
+        braking_m_s2 = braking_to_count_on(self._model, self._braking.envelope)
+        reaction_s = self._safety.config.reaction_s
+        edge = edge_outlook(state, self._safety.keep_in, braking_m_s2, reaction_s=reaction_s)
+        nearest = clearance(
+            state,
+            self._surroundings.others(now_ns),
+            max(braking_m_s2, 1e-6),
+            reaction_s=reaction_s,
+            radius_m=self._surroundings.radius_m,
+        )
+        return Outlook(
+            now_ns,
+            self.vehicle,
+            edge.time_to_edge_s,
+            edge.stopping_distance_m,
+            edge.room_m,
+            nearest.name,
+            nearest.room_m,
+            self._limited_by,
+        )
+
+    def _pulse(self, on_time_ms: bytes) -> None:
+        self._on_time_ms = on_time_ms
+        self._pulse_id = (self._pulse_id + 1) % 16

@@ -12,17 +12,25 @@ NO_STOP = 255
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ValveDemand(Message):
-    """On-times of the next modulation period, as the allocation asks for them.
+    """The pulses of the next modulation period: what was wanted, what the safety filter left, what they give.
 
     Attributes:
         on_time_ms: Per valve, 0 to 127.
+        source: Whose wish it is; see ``ValveSelection``.
+        wanted_force_body_n: Mean force over the period that was asked for.
+        wanted_torque_nm: Torque, likewise.
+        limited_by: What the safety filter changed it for; empty where it did not.
         delivered_force_body_n: Mean force that these pulses are expected to give over the period.
-        delivered_torque_nm: Mean torque, likewise.
+        delivered_torque_nm: Torque, likewise.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveDemand"
-    TOPIC: ClassVar = Topic("valve_demand", 20, Rank.COMMAND)
+    TOPIC: ClassVar = Topic("valve_demand", 10, Rank.COMMAND)
     on_time_ms: Bytes
+    source: Text
+    wanted_force_body_n: Float64x2
+    wanted_torque_nm: F64
+    limited_by: Text
     delivered_force_body_n: Float64x2
     delivered_torque_nm: F64
 
@@ -35,7 +43,7 @@ class ValveSelection(Message):
         counter: Of the selections reported, modulo 16.
         pulse_id: Changes with every new pulse, modulo 16.
         on_time_ms: Per valve, 0 to 127.
-        source: ``brake``, ``operator``, ``controller`` or ``closed``.
+        source: ``brake``, ``operator``, ``outside``, ``controller`` or ``closed``.
         reason: Why this source.
     """
 
@@ -46,6 +54,29 @@ class ValveSelection(Message):
     on_time_ms: Bytes
     source: Text
     reason: Text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlook(Message):
+    """Whether the mock-up can still stop, ten times a second while it flies.
+
+    Attributes:
+        time_to_edge_s: When coasting leaves its part of the table; infinite when it never does.
+        stopping_distance_m: Length of the way to rest at the thrust of the valves that work.
+        edge_room_m: Distance to the edge that is left after stopping.
+        nearest: Name of the other mock-up, or of the obstacle, that is met first; empty where none is.
+        nearest_room_m: Between the bodies after both have stopped.
+        limited_by: What the safety filter changes commands for at present; empty where it does not.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Outlook"
+    TOPIC: ClassVar = Topic("outlook", 10, Rank.COMMAND)
+    time_to_edge_s: F64
+    stopping_distance_m: F64
+    edge_room_m: F64
+    nearest: Text
+    nearest_room_m: F64
+    limited_by: Text
 
 
 @dataclass(frozen=True, slots=True, eq=False)

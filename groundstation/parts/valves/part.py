@@ -1,24 +1,27 @@
-"""Part ``valves``: the wrench becomes pulses, one choice of them, guarded commands and frames on the bus."""
+"""Part ``valves``: one wrench is chosen, filtered, made into pulses, guarded and sent over the bus."""
 
 from drivers.valve_bus.guard import Guard
 from drivers.valve_bus.valve_budget import OpenTimeLimits
 from groundstation.control.allocation import Allocator
 from groundstation.control.brake import BrakeConfig
+from groundstation.control.braking import Braking
 from groundstation.control.modulation import PulseConfig, PulseModulator
-from groundstation.control.mux import MuxConfig
-from groundstation.declarations.node import COMMANDS, FLIGHT, Node, NodeRow, Weight
+from groundstation.control.mux import CommandMux, MuxConfig
+from groundstation.control.safety_filter import SafetyFilter, SafetyFilterConfig
+from groundstation.control.surroundings import Surroundings
+from groundstation.declarations.node import COMMANDS, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
-from groundstation.declarations.rig import LABORATORY, Rig, check_address
+from groundstation.declarations.rig import LABORATORY, MOCK_UP_RADIUS_M, Rig, check_address
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.parts.valves.actions import PUSH
-from groundstation.parts.valves.allocation_node import AllocationNode
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.gauges import GAUGES
 from groundstation.parts.valves.guard_node import GuardNode
 from groundstation.parts.valves.messages import (
     CanIn,
     CanOut,
+    Outlook,
     ValveCommand,
     ValveDemand,
     ValveSelection,
@@ -41,10 +44,19 @@ def _modulator(type_: VehicleType) -> PulseModulator:
 
 
 def _command_mux(rig: Rig, vehicle: str) -> Node:
-    """With modulators of its own for braking and for pushing by hand."""
     type_ = rig.type_of(vehicle)
-    modulators = _modulator(type_), _modulator(type_)
-    return CommandMuxNode(vehicle, MuxConfig(), BrakeConfig(), type_.model(), modulators)
+    model, modulator = type_.model(), _modulator(type_)
+    period_ns = round(modulator.config.period_s * 1e9)
+    return CommandMuxNode(
+        vehicle,
+        tuple(name for name in rig.vehicles if name != vehicle),
+        CommandMux(MuxConfig()),
+        Braking(BrakeConfig(), model, modulator.envelope, period_ns),
+        SafetyFilter(SafetyFilterConfig(), rig.table.keep_in()),
+        Surroundings(MOCK_UP_RADIUS_M),
+        model,
+        modulator,
+    )
 
 
 def _guard(rig: Rig, vehicle: str) -> Node:
@@ -54,10 +66,6 @@ def _guard(rig: Rig, vehicle: str) -> Node:
 
 def _valve_writer(rig: Rig, vehicle: str) -> Node:
     return ValveWriter(vehicle, rig.vehicle(vehicle, ValvesOfVehicle).bus_index)
-
-
-def _allocation(rig: Rig, vehicle: str) -> Node:
-    return AllocationNode(vehicle, _modulator(rig.type_of(vehicle)))
 
 
 def _port(rig: Rig, vehicle: str) -> Port:
@@ -92,13 +100,12 @@ def _check(rig: Rig) -> None:
 
 PART = Part(
     name="valves",
-    summary="the wrench becomes pulses; one source is chosen, guarded and sent over the valve bus",
-    topics=(CanIn, ValveStatus, ValveDemand, ValveSelection, ValveCommand, CanOut),
+    summary="one wrench is chosen, filtered for safety, made into pulses, guarded and sent over the bus",
+    topics=(CanIn, ValveStatus, ValveDemand, ValveSelection, Outlook, ValveCommand, CanOut),
     nodes=(
         NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMuxNode, _command_mux),
         NodeRow("guard", COMMANDS, Weight.URGENT, GuardNode, _guard),
         NodeRow("valve_writer", COMMANDS, Weight.URGENT, ValveWriter, _valve_writer),
-        NodeRow("allocation", FLIGHT, Weight.LIGHT, AllocationNode, _allocation),
     ),
     ports=(PortRow("valve_writer", ValveBus, _port, is_of_rig=True),),
     actions=(PUSH,),

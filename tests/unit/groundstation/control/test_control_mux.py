@@ -95,13 +95,33 @@ def test_demands_that_were_forgotten_do_not_come_back_to_life(mux):
     assert mux.select(2) == Selection(Source.CONTROLLER, "hold again", True, "controller is fresh")
 
 
-@pytest.mark.parametrize("key", ["operator_s", "controller_s", "state_s"])
+def test_who_commands_from_outside_has_it_until_it_is_given_back(mux):
+    mux.receive_state(0)
+    mux.control("hold", 0)
+    mux.command_from_outside("spin", 0)
+    assert mux.select(0) == Selection(Source.OUTSIDE, "spin", True, "outside is fresh")
+    mux.operate("left", 0)
+    assert mux.select(0).source is Source.OPERATOR
+    mux.receive_state(400 * MS)
+    mux.control("hold", 400 * MS)
+    assert mux.select(400 * MS) == Selection(Source.BRAKE, None, False, "outside silent for 400 ms")
+    mux.give_back()
+    assert mux.select(400 * MS).source is Source.CONTROLLER
+    mux.command_from_outside("spin", 410 * MS)
+    mux.forget()
+    assert mux.select(410 * MS).reason == "nothing received from the outside yet"
+
+
+@pytest.mark.parametrize("key", ["operator_s", "outside_s", "controller_s", "state_s"])
 def test_every_source_has_a_freshness_of_its_own(key):
-    config = MuxConfig(**{**dict.fromkeys(("operator_s", "controller_s", "state_s"), 10.0), key: 0.05})
+    config = MuxConfig(
+        **{**dict.fromkeys(("operator_s", "outside_s", "controller_s", "state_s"), 10.0), key: 0.05}
+    )
     mux = CommandMux[str](config)
     mux.receive_state(0)
     offers = {
         "operator_s": lambda: mux.operate("left", 0),
+        "outside_s": lambda: mux.command_from_outside("spin", 0),
         "controller_s": lambda: mux.control("hold", 0),
         "state_s": lambda: None,
     }
@@ -109,9 +129,14 @@ def test_every_source_has_a_freshness_of_its_own(key):
     assert mux.select(50 * MS).source is not mux.select(51 * MS).source
 
 
-def test_unless_stated_demands_live_for_three_periods_and_states_for_two_seconds():
+def test_unless_stated_demands_live_for_more_than_two_periods_and_states_for_two_seconds():
     config = MuxConfig()
-    assert (config.operator_s, config.controller_s, config.state_s) == (0.3, 0.3, 2.0)
+    assert (config.operator_s, config.outside_s, config.controller_s, config.state_s) == (
+        0.3,
+        0.24,
+        0.24,
+        2.0,
+    )
 
 
 @pytest.mark.parametrize(

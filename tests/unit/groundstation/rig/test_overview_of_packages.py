@@ -29,7 +29,7 @@ def test_a_rig_shows_what_it_uses_and_where():
     assert rows["star_fix"].publishers == ("fix_reader",)
     assert rows["star_fix"].processes == ("*_flight",)
     assert rows["imu_bytes"].publishers == ("port */imu",)
-    assert rows["wrench"].receivers == ("allocation",)
+    assert rows["wrench"].receivers == ("supervisor (commands)", "command_mux (commands)")
     assert "command_mux (commands)" in rows["state"].receivers
     assert rows["star_image"].publishers == ("-",)  # it has no camera
     assert rows["journal"].publishers == ("the runner",)

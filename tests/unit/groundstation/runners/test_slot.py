@@ -19,7 +19,7 @@ def state(vehicle="alpha", sequence=1):
 
 
 def demand(sequence=1):
-    payload = ValveDemand(5, "alpha", bytes(8), (0.0, 0.0), 0.0)
+    payload = ValveDemand(5, "alpha", bytes(8), "controller", (0.0, 0.0), 0.0, "", (0.0, 0.0), 0.0)
     return Delivered(Envelope(ValveDemand.TOPIC, "alpha", sequence, 5), payload)
 
 

@@ -52,8 +52,8 @@ class Flight:
         """A state becomes a frame on the valve bus; every node has seen other messages, too."""
         self.publish(FusionStatus, wrench_ms - 0.5)
         wrench = self.publish(Wrench, wrench_ms, state)
-        demand = self.publish(ValveDemand, wrench_ms + 0.5, wrench)
-        chosen = self.publish(ValveSelection, wrench_ms + 1, demand)
+        self.publish(ValveDemand, wrench_ms + 0.5, wrench)
+        chosen = self.publish(ValveSelection, wrench_ms + 1, wrench)
         for late_ms in (0, 20):  # the guard sends what is selected again and again
             command = self.publish(ValveCommand, guard_ms + late_ms, chosen)
             self.publish(CanOut, bus_ms + late_ms, command)
@@ -160,7 +160,7 @@ def test_what_no_state_triggered_has_no_age(message, delivered, cause):
     flight.publish(CanOut, 1021, stopped)
     flight.publish(CanOut, 1022, request)  # an order to float
     flight.publish(CanOut, 1023)
-    brake = flight.publish(ValveSelection, 1024, state)  # no demand came, no wrench did
+    brake = flight.publish(ValveSelection, 1024, state)  # no wrench came
     flight.publish(CanOut, 1026, flight.publish(ValveCommand, 1025, brake))
     ledger = Ledger()
     for one in flight.messages:

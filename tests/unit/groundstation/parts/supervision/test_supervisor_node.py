@@ -7,12 +7,13 @@ import pytest
 
 from groundstation.control.keep_in import rectangle
 from groundstation.declarations.request import Ack, Request
+from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.operation.messages import RecorderStatus
 from groundstation.parts.supervision.memory import text_of
 from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
-from groundstation.parts.valves.messages import ValveDemand, ValveStatus
+from groundstation.parts.valves.messages import ValveStatus
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
 
@@ -57,7 +58,7 @@ class Driven:
         return (
             state("alpha"), status_of_fusion(), Findings(0, "alpha", (), ()),
             ValveStatus(self.now_ns, "alpha", 0, 0, armed, False, floating, math.nan, 0, 60.0),
-            ValveDemand(0, "alpha", bytes(8), (0.0, 0.0), 0.0),
+            Wrench(0, "alpha", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         )  # fmt: skip
 
     def fly(self):
@@ -183,7 +184,7 @@ class TestWhatItSees:
 
     def test_demands_and_findings(self, node):
         node.now_ns = 5
-        node.receive(ValveDemand(0, "alpha", bytes(8), (0.0, 0.0), 0.0))
+        node.receive(Wrench(0, "alpha", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         node.receive(Findings(0, "alpha", ("imu_stuck", "pushed"), ("a", "b")))
         assert node.known.demand_ns == 5
         with pytest.raises(ValueError, match="zip"):

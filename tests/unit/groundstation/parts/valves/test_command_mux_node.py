@@ -1,4 +1,4 @@
-"""The shell of the multiplexer: the supervisor's ruling says who commands the valves; by messages alone."""
+"""The shell of the multiplexer: who commands by the supervisor's ruling, filtered, as pulses; by messages."""
 
 import itertools
 import json
@@ -10,16 +10,21 @@ import pytest
 
 from groundstation.control.allocation import Allocator
 from groundstation.control.brake import BrakeConfig, brake_wrench, dead_reckoned
+from groundstation.control.braking import Braking
+from groundstation.control.keep_in import rectangle
 from groundstation.control.modulation import PulseConfig, PulseModulator
-from groundstation.control.mux import MuxConfig
-from groundstation.control.state import BodyWrench, ControlState
+from groundstation.control.mux import CommandMux, MuxConfig
+from groundstation.control.safety_filter import SafetyFilter, SafetyFilterConfig
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState
+from groundstation.control.surroundings import Surroundings
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.request import Ack, Request
+from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
-from groundstation.parts.valves.messages import ValveDemand, ValveSelection
+from groundstation.parts.valves.messages import Outlook, ValveDemand, ValveSelection
 
 MS = 1_000_000
 MODEL = VehicleModel(11.0, 0.25, square_of_eight())
@@ -31,7 +36,17 @@ def modulator():
 
 @cache
 def made():
-    return CommandMuxNode("alpha", MuxConfig(), BrakeConfig(), MODEL, (modulator(), modulator()))
+    pulses = modulator()
+    return CommandMuxNode(
+        "alpha",
+        ("beta",),
+        CommandMux(MuxConfig()),
+        Braking(BrakeConfig(), MODEL, pulses.envelope, 100 * MS),
+        SafetyFilter(SafetyFilterConfig(), rectangle((4.0, 3.0), margin_m=0.2)),
+        Surroundings(0.2),
+        MODEL,
+        pulses,
+    )
 
 
 @pytest.fixture
@@ -42,6 +57,7 @@ def mux():
 @pytest.fixture
 def flying(mux):
     list(mux.receive(ruling("controller"), 0))
+    list(mux.receive(state(-5000 * MS), -5000 * MS))
     return mux
 
 
@@ -53,13 +69,26 @@ def ruling(law, mode=None, cause="the cause"):
     )
 
 
-def demand(on_ms, now_ns=0):
-    return ValveDemand(now_ns, "alpha", bytes(on_ms), (0.0, 0.0), 0.0)
+PUSH = BodyWrench((0.1, 0.0), 0.0)
 
 
-def state(now_ns, position=(0.0, 0.0), velocity=(0.0, 0.0), status="flying", rate_rad_s=0.0, heading_rad=0.0):
+def demand(push=PUSH):
+    fx, fy = push.force_body_n
+    return Wrench(0, "alpha", fx, fy, 0.0, 0.0, 0.0, push.torque_nm)
+
+
+def pulses(*pushes):
+    """On-times of wrenches that follow each other, from nothing carried over."""
+    made = modulator()
+    return [bytes(made.update(push).on_time_ms) for push in pushes]
+
+
+def state(
+    now_ns, position=(0.0, 0.0), velocity=(0.0, 0.0), status="flying", rate_rad_s=0.0, heading_rad=0.0,
+    vehicle="alpha",
+):  # fmt: skip
     return VehicleState(
-        now_ns, "alpha", position, heading_rad, velocity, rate_rad_s, (1e-3, 1e-3, 1e-3), status, 1
+        now_ns, vehicle, position, heading_rad, velocity, rate_rad_s, (1e-3, 1e-3, 1e-3), status, 1
     )
 
 
@@ -74,22 +103,32 @@ def push(**arguments):
 
 
 def tick(mux, now_ms):
-    (selection,) = mux.tick(now_ms * MS)
-    assert isinstance(selection, ValveSelection)
+    return selected(mux.tick(now_ms * MS))
+
+
+def selected(messages):
+    """The selection among what was published."""
+    [selection] = [each for each in messages if isinstance(each, ValveSelection)]
     return selection
 
 
+def give(mux, now_ms, push=PUSH):
+    """A wrench of the controller arrives."""
+    return selected(mux.receive(demand(push), now_ms * MS))
+
+
 def rule(mux, now_ms, law, **words):
-    return list(mux.receive(ruling(law, **words), now_ms * MS))
+    found = mux.receive(ruling(law, **words), now_ms * MS)
+    return [each for each in found if isinstance(each, ValveSelection)]
 
 
 class TestLaws:
     def test_before_the_first_ruling_and_after_the_last_one_all_valves_close(self, mux):
-        (selection,) = mux.receive(demand([30] * 8), 0)
+        selection = give(mux, 0)
         assert (selection.source, selection.on_time_ms) == ("closed", bytes(8))
         assert selection.reason == "nothing comes from the supervisor"
         rule(mux, 0, "controller")
-        list(mux.receive(demand([30] * 8), 500 * MS))
+        give(mux, 400)
         assert tick(mux, 500).source == "controller"
         silent = tick(mux, 501)
         assert (silent.source, silent.on_time_ms) == ("closed", bytes(8))
@@ -98,13 +137,13 @@ class TestLaws:
     def test_a_closed_vehicle_closes_whoever_demands_what(self, mux, words):
         rule(mux, 0, "closed", **words)
         list(mux.receive(state(0, velocity=(0.1, 0.0)), 0))
-        (selection,) = mux.receive(demand([30] * 8), 0)
+        selection = give(mux, 0)
         assert (selection.source, selection.on_time_ms) == ("closed", bytes(8))
         assert selection.reason == (": ".join(words.values()) or "landed: the cause")
         assert tick(mux, 20).source == "closed"
 
     def test_a_ruling_that_changes_the_law_is_obeyed_at_once_and_a_repeated_one_is_silent(self, flying):
-        list(flying.receive(demand([30] * 8), 10 * MS))
+        give(flying, 10)
         (closed,) = rule(flying, 20, "closed")
         assert (closed.source, closed.on_time_ms) == ("closed", bytes(8))
         assert rule(flying, 30, "closed") == []
@@ -122,9 +161,9 @@ class TestLaws:
     def test_braking_by_order_beats_operator_and_controller(self, flying):
         list(flying.receive(state(0), 0))
         list(flying.receive(push(), 0))
-        list(flying.receive(demand([30] * 8), 0))
+        give(flying, 0)
         rule(flying, 0, "brake")
-        list(flying.receive(demand([30] * 8), 10 * MS))
+        give(flying, 10)
         assert tick(flying, 20).source == "brake"
 
     def test_without_a_state_braking_closes(self, flying):
@@ -139,25 +178,25 @@ class TestLaws:
 
 class TestController:
     def test_a_new_demand_goes_out_at_once(self, flying):
-        (selection,) = flying.receive(demand([30] * 8), 5 * MS)
-        assert (selection.source, selection.on_time_ms) == ("controller", bytes([30] * 8))
+        selection = give(flying, 5)
+        assert (selection.source, selection.on_time_ms) == ("controller", pulses(PUSH)[0])
         assert (selection.stamp_ns, selection.vehicle) == (5 * MS, "alpha")
 
     def test_an_old_demand_is_refreshed_and_not_started_again(self, flying):
-        (first,) = flying.receive(demand([30] * 8), 5 * MS)
+        first = give(flying, 5)
         second = tick(flying, 20)
         assert second.pulse_id == first.pulse_id
         assert second.counter == (first.counter + 1) % 16
-        (third,) = flying.receive(demand([30] * 8), 25 * MS)
+        third = give(flying, 25)
         assert third.pulse_id == (first.pulse_id + 1) % 16
 
     def test_counter_and_pulse_id_go_round_at_sixteen(self, flying):
-        seen = [next(iter(flying.receive(demand([30] * 8), 5 * MS))) for _ in range(32)]
+        seen = [give(flying, 5) for _ in range(32)]
         assert {selection.counter for selection in seen} == set(range(16))
         assert [s.pulse_id for s in seen] == [(seen[0].pulse_id + step) % 16 for step in range(32)]
 
     def test_silence_brakes_against_the_velocity(self, flying):
-        list(flying.receive(demand([0] * 8), 0))
+        give(flying, 0, NO_WRENCH)
         list(flying.receive(state(400 * MS, velocity=(0.05, 0.0)), 400 * MS))
         selection = tick(flying, 420)
         assert selection.source == "brake"
@@ -166,18 +205,18 @@ class TestController:
         assert not any(selection.on_time_ms[:2])
 
     def test_without_a_fresh_state_silence_closes_the_valves_with_one_new_pulse(self, flying):
-        (before,) = flying.receive(demand([30] * 8), 0)
+        before = give(flying, 0)
         closed = tick(flying, 500)
         assert (closed.source, closed.on_time_ms) == ("closed", bytes(8))
         assert closed.pulse_id == (before.pulse_id + 1) % 16
         assert tick(flying, 500).pulse_id == closed.pulse_id
 
     def test_after_closed_valves_a_demand_that_is_still_fresh_begins_a_new_pulse(self, flying):
-        (first,) = flying.receive(demand([30] * 8), 400 * MS)
+        first = give(flying, 400)
         closed = tick(flying, 501)  # the ruling is too old
         rule(flying, 502, "controller")
         again = tick(flying, 520)
-        assert (again.source, again.on_time_ms) == ("controller", bytes([30] * 8))
+        assert (again.source, again.on_time_ms) == ("controller", pulses(PUSH)[0])
         assert [first.pulse_id, closed.pulse_id, again.pulse_id] == [
             first.pulse_id + step for step in (0, 1, 2)
         ]
@@ -257,13 +296,13 @@ class TestBraking:
 
 
 class TestPush:
-    def sources(self, mux, steps, on_ms=0):
+    def sources(self, mux, steps):
         found = []
         for step in range(1, steps):
             now_ns = step * 20 * MS
             list(mux.receive(ruling("controller"), now_ns))
             list(mux.receive(state(now_ns), now_ns))
-            list(mux.receive(demand([on_ms] * 8), now_ns))
+            give(mux, step * 20, NO_WRENCH)
             found.append(tick(mux, step * 20))
         return found
 
@@ -320,7 +359,7 @@ class TestPush:
         list(flying.receive(push(span_s=5.0), 0))
         assert tick(flying, 20).source == "operator"
         assert list(flying.receive(request("resume"), 30 * MS)) == []
-        list(flying.receive(demand([0] * 8), 400 * MS))
+        give(flying, 400, NO_WRENCH)
         assert tick(flying, 400).source == "controller"
 
     def test_a_change_of_the_law_ends_it(self, flying):
@@ -341,3 +380,57 @@ class TestPush:
 
 def test_its_period(mux):
     assert mux.tick_period_ns == 20 * MS
+
+
+class TestFilter:
+    def made(self, mux, now_ms, push=PUSH):
+        """What was published for a wrench: the pulses with what became of the wish."""
+        [made] = [each for each in mux.receive(demand(push), now_ms * MS) if isinstance(each, ValveDemand)]
+        return made
+
+    def test_what_is_safe_is_not_changed(self, flying):
+        list(flying.receive(state(0, (0.5, 0.5)), 0))
+        made = self.made(flying, 5)
+        assert (made.source, made.limited_by) == ("controller", "")
+        assert made.wanted_force_body_n == PUSH.force_body_n
+        expected = modulator().update(PUSH).delivered
+        assert made.delivered_force_body_n == expected.force_body_n
+
+    @pytest.mark.parametrize("source", ["controller", "operator"])
+    def test_nobody_pushes_it_over_the_edge(self, flying, source):
+        list(flying.receive(state(0, (1.78, 0.0), (0.05, 0.0)), 0))
+        if source == "operator":
+            list(flying.receive(push(span_s=2.0), 0))
+            [made] = [each for each in flying.tick(0) if isinstance(each, ValveDemand)]
+        else:
+            made = self.made(flying, 5)
+        assert (made.source, made.limited_by) == (source, "edge")
+        assert made.delivered_force_body_n[0] < -0.05
+
+    def test_nor_into_another_mock_up(self, flying):
+        list(flying.receive(state(0, velocity=(0.03, 0.0)), 0))
+        assert self.made(flying, 5).limited_by == ""
+        list(flying.receive(state(0, (0.45, 0.0), vehicle="beta"), 0))
+        made = self.made(flying, 105)
+        assert made.limited_by == "beta"
+        assert made.delivered_force_body_n[0] < -0.05
+
+    def test_one_that_was_never_placed_is_nowhere(self, flying):
+        list(flying.receive(state(0), 0))
+        list(flying.receive(state(0, (0.45, 0.0), vehicle="beta", status="starting"), 0))
+        assert self.made(flying, 5).limited_by == ""
+
+    def test_the_outlook_is_published_ten_times_a_second(self, flying):
+        list(flying.receive(state(0, (1.0, 0.0), (0.1, 0.0)), 0))
+        list(flying.receive(state(0, (1.7, 0.0), vehicle="beta"), 0))
+        found = [each for step in range(1, 51) for each in flying.tick(step * 20 * MS)]
+        outlooks = [each for each in found if isinstance(each, Outlook)]
+        assert len(outlooks) == 10
+        first = outlooks[0]
+        braking_m_s2 = 0.9 * 0.44 / 11.0 - 0.005
+        stopping_m = 0.1 * (0.15 + 0.1 / (2.0 * braking_m_s2))
+        assert first.time_to_edge_s == pytest.approx(8.0)
+        assert first.stopping_distance_m == pytest.approx(stopping_m)
+        assert first.edge_room_m == pytest.approx(0.8 - stopping_m)
+        assert first.nearest == "beta"
+        assert first.nearest_room_m == pytest.approx(0.7 - 0.4 - stopping_m)
