@@ -30,8 +30,8 @@ from groundstation.supervision.faults import FAULTS
 
 EARLIEST_S, LATEST_S, AFTER_S = 14.0, 18.0, 26.0
 LEG_S = 5.0
-RADIUS_M, OVERHANG_M = 0.2, 0.1
-"""Of a mock-up, and so much of it beyond the rim counts as left."""
+RADIUS_M, TOUCH_M = 0.2, 0.001
+"""Of a mock-up; the emulated table has a rail, so who comes as near to it would have left."""
 ARMED_LATE_NS = 100_000_000
 AFLOAT_NS = 300_000_000
 """So long after it was disarmed the air may still be on: the order, the report."""
@@ -190,11 +190,11 @@ class Judge:
     def _place(self, truth: ReferenceState, now_ns: int) -> None:
         x_m, y_m = self._places[truth.vehicle] = truth.position_table_m
         if len(self._places) == 2:
-            self.hit_neighbour |= math.dist(*self._places.values()) < 2 * RADIUS_M
+            self.hit_neighbour |= math.dist(*self._places.values()) < 2 * RADIUS_M + TOUCH_M
         if truth.vehicle != "alpha":
             return
         room_m = min(2.0 - abs(x_m), 1.5 - abs(y_m)) - RADIUS_M
-        self.left_table |= room_m < -OVERHANG_M
+        self.left_table |= room_m < TOUCH_M
         if now_ns >= self.start_ns:
             self._origin = self._origin or (x_m, y_m)
             self.excursion_m = max(self.excursion_m, math.dist(self._origin, (x_m, y_m)))

@@ -24,7 +24,9 @@ from groundstation.control.half_planes import HalfPlane, nearest
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Vector2, rotate
 
-EDGE = "edge"
+RESTING_M = 0.06
+"""Off an edge or another body: what is held there drifts a little, and nobody should have to brake for it."""
+EDGE, TURN_RATE = "edge", "turn rate"
 _SLOWEST_BRAKING_M_S2 = 1e-6
 
 
@@ -38,6 +40,9 @@ class SafetyFilterConfig(BaseModel):
         gain_per_s: k: how fast the room may be used up.
         share_of_braking: Of the deceleration to count on; the rest is for noise and slope.
         torque_share: Of the largest torque that is left while the force is changed: speed goes first.
+        most_rate_rad_s: Turn rate that no torque may lead beyond; where the published inertial navigation
+            stops integrating (50 deg/s), with something to spare.
+        spin_down_s: Torque falls off linearly when the rate would reach that within so long.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -47,6 +52,8 @@ class SafetyFilterConfig(BaseModel):
     gain_per_s: float = Field(default=1.0, gt=0.0, le=5.0)
     share_of_braking: float = Field(default=0.85, gt=0.0, le=1.0)
     torque_share: float = Field(default=0.25, ge=0.0, le=1.0)
+    most_rate_rad_s: float = Field(default=0.8, gt=0.0)
+    spin_down_s: float = Field(default=0.5, gt=0.0)
 
 
 class Disc(NamedTuple):
@@ -118,6 +125,25 @@ class SafetyFilter:
             return Filtered((0.0, 0.0), _names(broken or planes), must_brake=True)
         return Filtered(found.point, _names(found.active), must_brake=False)
 
+    def resting_place(self, position_table_m: Vector2, discs: Sequence[Disc]) -> Vector2:
+        """Where to hold a place: the nearest one that is a little off everything; itself where none is."""
+        planes = [
+            HalfPlane((-inward[0], -inward[1]), offset - RESTING_M, EDGE)
+            for inward, offset in self.keep_in.inward()
+        ]
+        for disc in discs:
+            towards, _ = _towards(position_table_m, disc.position_table_m)
+            bound = _along(towards, disc.position_table_m) - disc.reach_m - RESTING_M
+            planes.append(HalfPlane(towards, bound, disc.name))
+        found = nearest(position_table_m, planes)
+        return position_table_m if found is None else found.point
+
+    def turned(self, wanted_rad_s2: float, rate_rad_s: float) -> float:
+        """The nearest angular acceleration that does not lead beyond the largest turn rate."""
+        room = self.config.most_rate_rad_s / self.config.spin_down_s
+        now = rate_rad_s / self.config.spin_down_s
+        return min(max(wanted_rad_s2, -room - now), room - now)
+
     def _edges(self, state: ControlState, braking_m_s2: float) -> list[HalfPlane]:
         distances_m = self.keep_in.edge_distances_m(state.position_table_m)
         return [
@@ -126,10 +152,7 @@ class SafetyFilter:
         ]
 
     def _disc(self, state: ControlState, disc: Disc, braking_m_s2: float) -> HalfPlane:
-        dx = disc.position_table_m[0] - state.position_table_m[0]
-        dy = disc.position_table_m[1] - state.position_table_m[1]
-        apart_m = math.hypot(dx, dy)
-        towards = (dx / apart_m, dy / apart_m) if apart_m > 0.0 else (1.0, 0.0)
+        towards, apart_m = _towards(state.position_table_m, disc.position_table_m)
         theirs_m_s = -_along(disc.velocity_table_m_s, towards)  # towards this mock-up
         way_m = 0.0
         if theirs_m_s > 0.0:
@@ -198,6 +221,13 @@ def body_force(acceleration_table_m_s2: Vector2, heading_rad: float, mass_kg: fl
     """Force that gives an acceleration, body axes."""
     x, y = rotate(acceleration_table_m_s2, -heading_rad)
     return mass_kg * x, mass_kg * y
+
+
+def _towards(here: Vector2, there: Vector2) -> tuple[Vector2, float]:
+    """Unit vector and distance; some direction where both are one place."""
+    dx, dy = there[0] - here[0], there[1] - here[1]
+    apart_m = math.hypot(dx, dy)
+    return ((dx / apart_m, dy / apart_m) if apart_m > 0.0 else (1.0, 0.0)), apart_m
 
 
 def _along(a: Vector2, b: Vector2) -> float:

@@ -6,8 +6,8 @@ from groundstation.control.braking import Braking
 from groundstation.control.edge import braking_to_count_on, edge_outlook
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux, Selection, Source
-from groundstation.control.safety_filter import SafetyFilter, body_force, table_acceleration
-from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, clamp
+from groundstation.control.safety_filter import TURN_RATE, Disc, SafetyFilter, body_force, table_acceleration
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Vector2, clamp
 from groundstation.control.surroundings import Surroundings
 from groundstation.control.vehicle import VehicleModel
 from groundstation.declarations.lease import Lease, LeaseCheck
@@ -154,13 +154,14 @@ class CommandMuxNode(Node):
             self._modulator.reset()
             self._due_ns = now_ns
             self._limited_by = ""
+            self._braking.begin()
         if selection.source is Source.CLOSED:
             if changed:
                 self._pulse(CLOSED)
         elif selection.source is Source.BRAKE:
             if now_ns >= self._due_ns:
                 self._due_ns += self._period_ns
-                yield from self._make(self._braking.wrench(now_ns), now_ns)
+                yield from self._make(self._braking.wrench(now_ns, self._resting_place), now_ns)
         elif selection.is_new or changed:
             yield from self._make(selection.demand, now_ns)
         self._counter = (self._counter + 1) % 16
@@ -178,7 +179,8 @@ class CommandMuxNode(Node):
         """Pulses for what is wanted, as far as it is safe."""
         if wanted is None:
             return
-        safe = wanted if self._source is Source.BRAKE else self._filtered(wanted, now_ns)
+        is_brake = self._source is Source.BRAKE and self._braking.held is None
+        safe = wanted if is_brake else self._filtered(wanted, now_ns)
         pulses = self._modulator.update(safe)
         self._braking.deliver(pulses.delivered)
         self._pulse(bytes(pulses.on_time_ms))
@@ -203,17 +205,26 @@ class CommandMuxNode(Node):
         found = self._safety.filtered(
             table_acceleration(makeable, state.heading_rad, self._model.mass_kg),
             state,
-            self._surroundings.discs(self._sigma_m, now_ns, frozenset()),
+            self._discs(now_ns),
             braking_to_count_on(self._model, envelope),
         )
-        self._limited_by = ", ".join(found.limited_by)
-        if not found.limited_by:
-            return wanted
+        inertia = self._model.inertia_kg_m2
+        torque = inertia * self._safety.turned(makeable.torque_nm / inertia, state.rate_rad_s)
+        spins = () if torque == makeable.torque_nm else (TURN_RATE,)
+        self._limited_by = ", ".join(found.limited_by + spins)
         if found.must_brake:
             return self._braking.wrench(now_ns) or NO_WRENCH
+        if not found.limited_by:
+            return BodyWrench(makeable.force_body_n, torque) if spins else wanted
         force = body_force(found.acceleration_table_m_s2, state.heading_rad, self._model.mass_kg)
-        torque = clamp(makeable.torque_nm, self._safety.config.torque_share * envelope.max_torque_nm)
+        torque = clamp(torque, self._safety.config.torque_share * envelope.max_torque_nm)
         return envelope.saturate(BodyWrench(force, torque))
+
+    def _resting_place(self, position_table_m: Vector2, now_ns: int) -> Vector2:
+        return self._safety.resting_place(position_table_m, self._discs(now_ns))
+
+    def _discs(self, now_ns: int) -> list[Disc]:
+        return self._surroundings.discs(self._sigma_m, now_ns, frozenset())
 
     def _look_ahead(self, state: ControlState, now_ns: int) -> Outlook:
         braking_m_s2 = braking_to_count_on(self._model, self._braking.envelope)
