@@ -240,11 +240,12 @@ def report(rows: list[dict]) -> int:
     left = [row["seed"] for row in rows if row["left_table"]]
     touched = [row["seed"] for row in rows if row["touched"]]
     limited = sum(row["limited"] for row in rows) / max(1, sum(row["demands"] for row in rows))
+    room_m = min(row["least_room_m"] for row in rows)
+    apart_m = min(row["least_distance_m"] for row in rows)
     print(
         f"{len(rows)} sequences of {SEQUENCE_S:g} s: left the table {len(left)} {left}, "
-        f"touched {len(touched)} {touched}; least room to the rim {1e3 * min(row['least_room_m'] for row in rows):.0f} mm, least "
-        f"distance {1e3 * min(row['least_distance_m'] for row in rows):.0f} mm; "
-        f"{limited:.0%} of {sum(row['demands'] for row in rows)} demands limited"
+        f"touched {len(touched)} {touched}; least room to the rim {1e3 * room_m:.0f} mm, "
+        f"least distance {1e3 * apart_m:.0f} mm; {limited:.0%} of the demands limited"
     )
     return int(bool(left or touched))
 

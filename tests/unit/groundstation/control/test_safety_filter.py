@@ -172,3 +172,31 @@ def test_forces_and_accelerations_go_there_and_back():
     there = table_acceleration(wrench, 0.7, 11.0)
     assert body_force(there, 0.7, 11.0) == pytest.approx(wrench.force_body_n)
     assert table_acceleration(BodyWrench((11.0, 0.0), 0.0), math.pi / 2, 11.0) == pytest.approx((0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("wanted", "rate", "given"),
+    [
+        (0.1, 0.0, 0.1),
+        (9.0, 0.0, 1.6),
+        (9.0, 0.7, 0.2),
+        (-9.0, 0.7, -3.0),
+        (0.0, 1.0, -0.4),
+        (0.0, -1.0, 0.4),
+    ],
+)
+def test_no_torque_leads_beyond_the_largest_turn_rate(wanted, rate, given):
+    assert make().turned(wanted, rate) == pytest.approx(given)
+
+
+def test_a_place_to_rest_is_a_little_off_everything():
+    assert make().resting_place((0.5, 0.2), []) == (0.5, 0.2)
+    assert make().resting_place((1.79, 0.2), []) == pytest.approx((1.74, 0.2))
+    assert make().resting_place((1.9, -1.4), []) == pytest.approx((1.74, -1.24))
+    beside = Disc("beta", (0.43, 0.0), (0.0, 0.0), REACH_M, 1.0)
+    assert make().resting_place((0.0, 0.0), [beside]) == pytest.approx((0.43 - REACH_M - 0.06, 0.0))
+
+
+def test_where_nothing_is_off_everything_it_rests_where_it_is():
+    around = [Disc(str(k), (0.1 * x, 0.0), (0.0, 0.0), 3.0, 1.0) for k, x in enumerate((-1, 1))]
+    assert make().resting_place((0.0, 0.0), around) == (0.0, 0.0)
