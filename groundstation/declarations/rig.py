@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from drivers.errors import Refused
 from drivers.socket_url import check_socket_url
 from groundstation.control.keep_in import KeepIn, rectangle
+from groundstation.control.surroundings import Obstacle
 from groundstation.declarations.names import PATTERN
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import Delay, Positive, Section, Sigma
@@ -41,8 +42,21 @@ VehicleName = Annotated[str, Field(pattern=f"^{PATTERN}$")]
 S = TypeVar("S", bound=Section)
 
 
+class KeepOutSection(Section):
+    """A round place of the table that mock-ups keep out of: a lamp, a tripod, a hole."""
+
+    name: VehicleName
+    x_m: float
+    y_m: float
+    radius_m: Positive
+
+    def obstacle(self) -> Obstacle:
+        """The place as the safety filter knows it."""
+        return Obstacle(self.name, (self.x_m, self.y_m), self.radius_m)
+
+
 class TableSection(Section):
-    """The table: its edges in table coordinates, and what is known of how it pulls.
+    """The table: its edges in table coordinates, what stands on it, and what is known of how it pulls.
 
     ``map`` is the result of ``calibrate table-map``: filter and controller feed it forward. ``legs`` say
     where the legs stand, for advice on levelling. The sigmas say how far from level and flat a table without
@@ -53,6 +67,7 @@ class TableSection(Section):
     x_max_m: float
     y_min_m: float
     y_max_m: float
+    keep_out: tuple[KeepOutSection, ...] = ()
     map: RigFile | None = None
     legs: dict[str, tuple[float, float]] = Field(default_factory=dict)
     slope_sigma_m_s2: Sigma | None = None
@@ -66,6 +81,14 @@ class TableSection(Section):
                 levelling((0.0, 0.0), np.eye(2), self.legs)
             except ValueError as error:
                 raise ValueError(f"legs: {error}") from error
+        return self
+
+    @model_validator(mode="after")
+    def _named_apart(self) -> Self:
+        names = [section.name for section in self.keep_out]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"keep_out: two places are called {name!r}")
         return self
 
     @model_validator(mode="after")
@@ -95,6 +118,10 @@ class TableSection(Section):
         size_m = (self.x_max_m - self.x_min_m, self.y_max_m - self.y_min_m)
         centre_m = ((self.x_max_m + self.x_min_m) / 2, (self.y_max_m + self.y_min_m) / 2)
         return rectangle(size_m, margin_m=MOCK_UP_RADIUS_M, centre_table_m=centre_m)
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What stands on the table."""
+        return tuple(section.obstacle() for section in self.keep_out)
 
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a mock-up at this place is on the table as a whole."""

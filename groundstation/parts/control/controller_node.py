@@ -8,6 +8,7 @@ from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
+from groundstation.control.surroundings import Obstacle
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
@@ -40,6 +41,7 @@ class ControllerNode(Node):
         neighbours: Other vehicles whose states the law wants, at their full rate.
         others: All other vehicles: it is not sent to where one of them is, or is sent.
         period_s: Of the modulation.
+        obstacles: What stands on the table: goals in it are refused.
         table_map: What pulls where on the table, fed forward; None where nobody knows.
     """
 
@@ -60,6 +62,7 @@ class ControllerNode(Node):
         table_map: SlopeGrid | None = None,
         holding: Controller | None = None,
         *,
+        obstacles: tuple[Obstacle, ...] = (),
         waits: bool = False,
     ) -> None:
         super().__init__(vehicle, round(period_s * 1e9))
@@ -70,7 +73,7 @@ class ControllerNode(Node):
         self._keep_in = keep_in
         self._followed = frozenset((vehicle, *neighbours))
         self._vehicles = (vehicle, *others)
-        self._others = Others()
+        self._others = Others(obstacles=obstacles)
         self._lease = LeaseCheck()
         self._states: dict[str, tuple[int, ControlState]] = {}
         self._own_rate = RateMean()

@@ -17,7 +17,7 @@ from groundstation.parts.control.controller_node import ControllerNode
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of, neighbours_of
-from groundstation.supervision.apart import too_near
+from groundstation.supervision.apart import in_the_way, too_near
 
 HOLDING = "go_to"
 """The controller that flies where a program is interrupted."""
@@ -60,6 +60,7 @@ def controller_node(rig: Rig, vehicle: str, law: Controller | None = None) -> Co
         rig.type_of(vehicle).valves.period_s,
         rig.table.slope_grid(),
         make_controller(HOLDING, {}, model, keep_in) if has_program else None,
+        obstacles=rig.table.obstacles(),
         waits=section.waits,
     )
 
@@ -93,6 +94,10 @@ def _check(rig: Rig) -> None:
 def _check_holds(rig: Rig) -> None:
     """Poses that are held at the same time are apart; who follows others is told by them where to go."""
     held = {name: rig.vehicles[name].hold for name in rig.vehicles if not neighbours_of(rig, name)}
+    for name, hold in held.items():
+        refusal = in_the_way((hold.x_m, hold.y_m), rig.table.obstacles())
+        if refusal:
+            raise ValueError(f"vehicles.{name}.hold: {refusal}")
     for (name, hold), (other, its) in itertools.combinations(held.items(), 2):
         apart_m = math.dist((hold.x_m, hold.y_m), (its.x_m, its.y_m))
         refusal = too_near(f"the hold pose of {name}", apart_m, relation="from there")

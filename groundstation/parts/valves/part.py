@@ -53,7 +53,7 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
         CommandMux(MuxConfig()),
         Braking(BrakeConfig(), model, modulator.envelope, period_ns),
         SafetyFilter(SafetyFilterConfig(), rig.table.keep_in()),
-        Surroundings(MOCK_UP_RADIUS_M),
+        Surroundings(MOCK_UP_RADIUS_M, rig.table.obstacles()),
         model,
         modulator,
     )

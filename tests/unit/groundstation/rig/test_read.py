@@ -182,6 +182,22 @@ def test_what_is_no_rig_file_is_one_sentence(tmp_path, content, sentence):
         ('mock_up = "standard"', 'mock_up = "big"', "vehicles.alpha.mock_up: 'big' is not among mock_ups"),
         ("x_m = 0.2", "x_m = 1.9", "vehicles.alpha.hold: (1.9, 0.1) m is nearer than 0.2 m"),
         ("x_min_m = -2.0", "x_min_m = 1.9", "table: x_min_m = 1.9 and x_max_m = 2 leave no room"),
+        (
+            "x_min_m = -2.0",
+            'x_min_m = -2.0\nkeep_out = [{ name = "lamp", x_m = 0.3, y_m = 0.1, radius_m = 0.1 }]',
+            "vehicles.alpha.hold: lamp is 0.10 m from there, 0.325 m are asked for",
+        ),
+        (
+            "x_min_m = -2.0",
+            'x_min_m = -2.0\nkeep_out = [{ name = "lamp", x_m = 0.3, y_m = 0.1 }]',
+            "'table.keep_out.0.radius_m' is missing",
+        ),
+        (
+            "x_min_m = -2.0",
+            'x_min_m = -2.0\nkeep_out = [{ name = "lamp", x_m = 1.5, y_m = 0.1, radius_m = 0.1 }, '
+            '{ name = "lamp", x_m = 1.2, y_m = 1.1, radius_m = 0.1 }]',
+            "table: keep_out: two places are called 'lamp'",
+        ),
         ("baud = 250000", "baud = 9600", "mock_ups.standard.imu.baud: "),
         ("bus_index", "bus_idx", "'vehicles.alpha.bus_idx' is no known key (a typo?)"),
         ("[vehicles.alpha]", "[vehicles.Alpha]", "vehicles.Alpha: "),
