@@ -69,12 +69,11 @@ def test_no_plan_burns_less_than_the_allocated_one(allocator):
         demand = BodyWrench(tuple(rng.normal(0.0, 0.2, 2)), rng.normal(0.0, 0.04))
         # a little inside, where the solver's feasibility tolerance does not matter
         inside = 0.999 * vector(allocator.envelope.saturate(demand))
-        count = allocator.effectiveness.shape[1]
-        best = linprog(np.ones(count), A_eq=allocator.effectiveness, b_eq=inside, bounds=(0.0, 1.0))
+        best = linprog(allocator.flow, A_eq=allocator.effectiveness, b_eq=inside, bounds=(0.0, 1.0))
         assert best.status == 0
         for sparse in (False, True):
             duty = allocator.allocate(BodyWrench((inside[0], inside[1]), inside[2]), sparse=sparse)
-            assert duty.sum() == pytest.approx(best.fun, abs=1e-6)
+            assert allocator.flow @ duty == pytest.approx(best.fun, abs=1e-6)
 
 
 @given(demand=demands)
@@ -85,6 +84,12 @@ def test_a_mirrored_demand_opens_the_mirrored_valves(demand):
     # mirrored at the body x axis: valves at +y and -y, and pushes along +y and -y, change places
     mirrored = allocator.allocate(BodyWrench((force_x, -force_y), -torque))
     assert mirrored[[1, 0, 3, 2, 6, 7, 4, 5]] == pytest.approx(duty, abs=1e-7)
+
+
+def test_gas_flows_in_proportion_to_thrust():
+    assert ALLOCATORS[0].flow.tolist() == [1.0] * 8
+    thrust = np.array([valve.thrust_n for valve in HEXAGON.valves])
+    assert ALLOCATORS[1].flow == pytest.approx(thrust / thrust.mean())
 
 
 def test_a_sparse_plan_for_a_push_along_one_axis_uses_its_pair_only():

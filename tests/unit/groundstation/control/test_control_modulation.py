@@ -97,6 +97,53 @@ def test_the_delivered_wrench_is_what_slow_valves_really_give(sequence):
     assert opened.sum() / 1000.0 == pytest.approx(sum(one.open_valve_s for one in pulses))
 
 
+def sagged_impulse(on, columns, sag, config):
+    """Newton-seconds by 0.1 ms steps: every valve by its delays, all the weaker the more are open."""
+    period_ms, step_ms = config.period_s * 1000.0, 0.1
+    closes_at = np.full(8, -1.0)
+    total = np.zeros(3)
+    for row in on:
+        opens_at = np.where(closes_at > 0.0, 0.0, config.open_delay_s * 1000.0)
+        close_ms = config.close_delay_s * 1000.0
+        closes_at = np.where(row > 0, row + close_ms, np.minimum(closes_at, close_ms))
+        middle = np.arange(0.5 * step_ms, period_ms, step_ms)[:, None]
+        is_open = (middle >= np.where(row > 0, opens_at, 0.0)) & (middle < closes_at)
+        factor = sag ** np.maximum(0.0, is_open.sum(axis=1) - 1.0)
+        total += columns @ (is_open * factor[:, None]).sum(axis=0) * step_ms / 1000.0
+        closes_at = closes_at - period_ms
+    return total
+
+
+@given(st.lists(demands, min_size=1, max_size=12), st.sampled_from([0.97, 0.9]))
+@settings(max_examples=25)
+def test_a_sagging_supply_delivers_what_is_said(sequence, sag):
+    config = PulseConfig(sag=sag)
+    modulator = PulseModulator(ALLOCATOR, config)
+    pulses = [modulator.update(demand) for demand in [*sequence, NO_WRENCH, NO_WRENCH, NO_WRENCH]]
+    on = np.array([one.on_time_ms for one in pulses], dtype=float)
+    claimed = sum(vector(one.delivered) for one in pulses) * config.period_s
+    assert sagged_impulse(on, ALLOCATOR.effectiveness, sag, config) == pytest.approx(claimed, abs=1e-9)
+
+
+def test_what_the_sag_takes_is_given_later():
+    demand, periods = BodyWrench((0.2, 0.1), 0.01), 100
+    told, untold = (PulseModulator(ALLOCATOR, PulseConfig(sag=sag)) for sag in (0.94, 1.0))
+    config = told.config
+    wanted = vector(demand) * periods * config.period_s
+    given = [
+        sagged_impulse(
+            [np.array(modulator.update(demand).on_time_ms, dtype=float) for _ in range(periods)],
+            ALLOCATOR.effectiveness,
+            0.94,
+            config,
+        )
+        for modulator in (told, untold)
+    ]
+    carried = 3 * 0.010 * np.array((0.22, 0.22, 0.033))
+    assert (np.abs(given[0] - wanted) <= carried).all()
+    assert given[1][0] < 0.96 * wanted[0]
+
+
 def test_a_saturated_demand_is_not_remembered():
     modulator = PulseModulator(ALLOCATOR, PulseConfig())
     for _ in range(50):
