@@ -58,6 +58,15 @@ def leaking(share: float) -> ValveHealth:
     return ValveHealth(max(1.0, share), share)
 
 
+def health_of(open_shares: Sequence[float], shut_shares: Sequence[float]) -> tuple[ValveHealth, ...]:
+    """States of health from what a message states.
+
+    Raises:
+        ValueError: See `ValveHealth`, or the lengths differ.
+    """
+    return tuple(ValveHealth(each, rest) for each, rest in zip(open_shares, shut_shares, strict=True))
+
+
 def shares(health: Sequence[ValveHealth], valves: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What commands add, and what comes without one, both as shares of the rig's thrust, shape (n,).
 

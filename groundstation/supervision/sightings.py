@@ -25,6 +25,8 @@ LATE_TICK_S = 0.1
 STOOD_STILL_S = 1.0
 CONTROLLER_S = 0.5
 LARGEST_SIGMA_M, LARGEST_SIGMA_RAD = 0.05, math.radians(5.0)
+LEAST_BRAKING_M_S2 = 0.005
+"""With less no push could be braked on a table; a sixth of what healthy valves give."""
 LEAST_TANK_PA = 30e5
 LEAST_ROOM_S = 60.0
 REST_SPEED_M_S, REST_RATE_RAD_S = 0.012, math.radians(3.0)
@@ -85,7 +87,7 @@ class Sightings:
 
     Attributes:
         keep_in: Part of the table for the centres of mock-ups.
-        braking_m_s2: Deceleration to count on.
+        braking_m_s2: Deceleration to count on, with the valves that work.
         radius_m: Of a mock-up.
         began_ns: When the supervisor began: nothing is silent before its time.
         most_frames_hz: Frames a second of which the bus is flooded.
@@ -105,6 +107,7 @@ class Sightings:
         memory_ns: When that was reported last.
         tick_ns: When the supervisor looked last.
         late_s: How late it looked now.
+        missing_thrust: What the valves that work cannot make; empty where they suffice to fly.
     """
 
     keep_in: KeepIn
@@ -128,6 +131,7 @@ class Sightings:
     memory_ns: int = 0
     tick_ns: int | None = None
     late_s: float = 0.0
+    missing_thrust: str = ""
 
     def look(self, now_ns: int, period_ns: int) -> None:
         """Note the moment: how much later it is than it should be."""
@@ -179,6 +183,7 @@ class Sightings:
         found.update(self._station(now_ns))
         found.update(self._supplies())
         if is_aloft:
+            found.update(self._thrust())
             found.update(self._motion(now_ns))
             found.update(self._estimate())
             found.update(self._obedience(now_ns, may_open=may_open))
@@ -219,6 +224,12 @@ class Sightings:
             yield "can_flooded", f"{node.bus_rate_hz:.0f} frames a second"
         if node.faults & UNDERVOLTAGE:
             yield "battery_low", "the valve node reports undervoltage"
+
+    def _thrust(self) -> Iterator[tuple[str, str]]:
+        if self.missing_thrust:
+            yield "thrust_missing", self.missing_thrust
+        elif self.braking_m_s2 < LEAST_BRAKING_M_S2:
+            yield "thrust_missing", f"{1e3 * self.braking_m_s2:.1f} mm/s^2 to brake with"
 
     def _motion(self, now_ns: int) -> Iterator[tuple[str, str]]:
         own = self.own

@@ -4,9 +4,11 @@
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 
+from groundstation.control.valve_health import ValveHealth
 from groundstation.control.vehicle import VehicleModel
 from groundstation.supervision.finding import Finding
 from groundstation.supervision.thrust_blocks import Block, ThrustBlocks
@@ -73,6 +75,7 @@ class ValveConsistency:
 
     Attributes:
         threshold: Evidence at which a fault is believed, in natural logarithms.
+        health: What valves give that were named, by their numbers.
     """
 
     def __init__(self, model: VehicleModel, config: ValveConsistencyConfig) -> None:
@@ -91,6 +94,7 @@ class ValveConsistency:
         self._inquiry = ValveInquiry(self._fit, self.threshold, config.block_s, config.wait_s)
         self._largest = max(self._fit.sizes)
         self._valve_findings: tuple[Finding, ...] = ()
+        self.health: Mapping[int, ValveHealth] = {}
         self._is_settled = False
         self._pushed: tuple[int, Finding] | None = None
         self._shifted: tuple[Finding, ...] = ()
@@ -114,8 +118,9 @@ class ValveConsistency:
         self._begin()
 
     def reset(self) -> None:
-        """Forget findings."""
+        """Forget findings, and what valves were found to give."""
         self._valve_findings = ()
+        self.health = {}
         self._is_settled = False
         self._fit.forget_weak()
         self._shifted = ()
@@ -197,15 +202,16 @@ class ValveConsistency:
             self._fit.learn(block, misfit)
 
     def _name(self, stamp_ns: int, verdict: Verdict) -> None:
-        """Believe it. A valve that is weak may get worse, so what it gives now is taken for known."""
+        """Believe it. What a weak or closed valve gives now is taken for known, and the watch goes on."""
         best = verdict.best
         if verdict.is_hand:
             change_m_s = best.size * self._fit.sizes[best.valve] * self._config.block_s
             self._push(stamp_ns, change_m_s, "a force that is no valve's")
             return
         self._suspicions.drop()
-        self._valve_findings += (verdict.finding(),)
-        if best.kind is Kind.WEAK:
+        self._valve_findings += verdict.findings()
+        self.health = {**self.health, **verdict.health()}
+        if best.kind in (Kind.WEAK, Kind.CLOSED):
             self._fit.take_weak(best.valve, best.size)
         else:
             self._is_settled = True

@@ -16,8 +16,8 @@ from groundstation.supervision.valve_trial import OPENS_CHANCE, STAYS_CHANCE, mi
 WEAK_GAIN = 0.5
 HEALTHY_GAIN = 0.8
 """A valve that was better and is now this good is still called healthy."""
-KNOWN_WEAK_GAIN = 0.6
-"""Below the gain of any healthy valve: this one was named weak before."""
+KNOWN_WEAK_GAIN, KNOWN_CLOSED_GAIN = 0.6, 0.25
+"""Below the gain of any healthy valve: this one was named weak, or closed, before."""
 LEAK_SHARE = 0.15
 BLOCK_CAP = 8.0
 LEAK_CAP = 1.0
@@ -113,7 +113,8 @@ class ValveSuspicions:
             if share > 0.0 or turned > 0.0 or closed.evidence > 0.0 or weak.evidence > 0.0:
                 healthy = min(0.0, HEALTHY_GAIN - gain) * share
                 usual = (along - half * healthy) * healthy / variance
-                for case, left in ((closed, 0.0), (weak, WEAK_GAIN))[: 2 if gain > KNOWN_WEAK_GAIN else 1]:
+                known = (gain <= KNOWN_CLOSED_GAIN) + (gain <= KNOWN_WEAK_GAIN)
+                for case, left in ((closed, 0.0), (weak, WEAK_GAIN))[: 2 - known]:
                     amplitude = (left - gain) * share
                     by_force = (along - half * amplitude) * amplitude / variance - usual
                     if case.evidence > 0.0 or by_force + by_turn > 0.0:

@@ -4,11 +4,19 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from groundstation.control.valve_health import (
+    MOST_SHARE,
+    STUCK_CLOSED,
+    ValveHealth,
+    leaking,
+    stuck_open,
+    weak,
+)
 from groundstation.supervision.finding import Finding
 from groundstation.supervision.thrust_blocks import Block
 from groundstation.supervision.thrust_fit import Misfit, ThrustFit
 from groundstation.supervision.valve_hypotheses import Suspicion
-from groundstation.supervision.valve_trial import Explanation, Kind, ValveTrial
+from groundstation.supervision.valve_trial import CLOSED_SHARE, Explanation, Kind, ValveTrial
 
 SURE = 7.0
 """Of two explanations the better one is named alone when it is e^7 = 1100 times as likely."""
@@ -36,9 +44,25 @@ class Verdict(NamedTuple):
     rivals: tuple[Explanation, ...]
     is_hand: bool
 
-    def finding(self) -> Finding:
-        """The fault in words; not for hands."""
+    def findings(self) -> tuple[Finding, ...]:
+        """The fault in words; not for hands. What may as well be a valve that does not shut is said to be."""
+        open_too = [
+            each for each in self.rivals if each.kind is Kind.OPEN and self.best.kind is not Kind.OPEN
+        ]
+        found = self._finding(self.best, self.rivals)
+        return (found, *(self._finding(each, (self.best,)) for each in open_too[:1]))
+
+    def health(self) -> dict[int, ValveHealth]:
+        """What the valve gives now, by its number; of those that cannot be told apart nothing is known."""
         best = self.best
+        if best.valve < 0 or self.rivals:
+            return {}
+        if best.kind is Kind.OPEN:
+            share = min(best.size, MOST_SHARE)
+            return {best.valve: stuck_open(share) if share >= CLOSED_SHARE else leaking(share)}
+        return {best.valve: STUCK_CLOSED if best.kind is Kind.CLOSED else weak(1.0 - best.size)}
+
+    def _finding(self, best: Explanation, rivals: tuple[Explanation, ...]) -> Finding:
         if best.kind is Kind.SUPPLY:
             return Finding(
                 Kind.WEAK.value, "all valves at half thrust or less: supply pressure", "all valves"
@@ -50,7 +74,7 @@ class Verdict(NamedTuple):
             Kind.OPEN: f"gives {part} thrust that was not commanded",
         }[best.kind]
         detail = f"valve {best.valve} {what} ({best.thrust_s:.2f} s of it)"
-        others = sorted({f"{each.valve} ({each.kind.value})" for each in self.rivals})
+        others = sorted({f"{each.valve} ({each.kind.value})" for each in rivals})
         if others:
             detail += f"; cannot be told apart from valve {', '.join(others)}"
         return Finding(best.kind.value, detail, f"valve {best.valve}")
@@ -129,10 +153,9 @@ class ValveInquiry:
         self.forget()
         if best.kind is Kind.TIMING:
             return None
-        graver = [each for each in rivals if each.valve >= 0 and each.kind is not Kind.WEAK]
-        if best.kind in (Kind.WEAK, Kind.SUPPLY) and graver:
-            best, rivals = graver[0], (best, *(each for each in rivals if each is not graver[0]))
         turns_otherwise = best.turning >= _TURN_KNOWN and best.by_rate < -0.5 * best.turning
         is_across = best.across > _ACROSS + 3.0 * best.across_sigma
         others = tuple(each for each in rivals if each.valve >= 0)
+        if best.kind is Kind.SUPPLY and others:  # where one valve alone was commanded, it may be that one
+            best, others = others[0], others[1:]
         return Verdict(best, others, best.kind is Kind.OPEN and (turns_otherwise or is_across))

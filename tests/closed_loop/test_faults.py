@@ -9,8 +9,8 @@ from groundstation.parts.fusion.messages import FixAccount, FusionStatus, Vehicl
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.reference.messages import ReferenceState
-from groundstation.parts.supervision.messages import Faults
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
+from groundstation.parts.supervision.messages import Faults, ValveShares
+from groundstation.parts.valves.messages import ValveCommand, ValveDemand, ValveSelection, ValveStatus
 
 FAULT_S, END_S, STOP_S = 4.0, 6.0, 8.0
 
@@ -139,15 +139,24 @@ def test_wrong_fixes_are_refused_and_counted(fly):
     assert_survived(flight)
 
 
-@pytest.mark.parametrize("kind", ["stuck_open_valve", "stuck_closed_valve"])
-def test_a_valve_that_fails_is_named_and_lands_the_vehicle_until_a_person_lets_it_fly(fly, kind):
-    flight = fly(fault(kind, valve=0)).run(STOP_S + 8.0)
-    name = "valve_stuck_open" if kind == "stuck_open_valve" else "valve_stuck_closed"
-    assert name in flight.faults()
+def test_a_valve_that_sticks_open_is_named_and_lands_the_vehicle_until_a_person_lets_it_fly(fly):
+    flight = fly(fault("stuck_open_valve", valve=0)).run(STOP_S + 8.0)
+    assert "valve_stuck_open" in flight.faults()
     assert flight.modes()[-1] == "landed"
     assert flight.off_goal()[0][-1] < 0.2
     flight.request("fly")
     assert flight.run(6.0).modes()[-1] == "flying"
+
+
+def test_a_valve_that_sticks_closed_is_named_and_the_others_hold_the_place(fly):
+    lasting = fault("stuck_closed_valve", valve=0).replace(f"end_s = {END_S}", "end_s = 100.0")
+    flight = fly(lasting).run(60.0)
+    assert "valve_stuck_closed" in flight.faults()
+    assert flight.modes(start_s=FAULT_S) == ["flying"]
+    [shares] = flight.of(ValveShares)
+    assert shares.open_ratio == (0.0, *[1.0] * 7)
+    assert not any(demand.on_time_ms[0] for demand in flight.of(ValveDemand, start_s=30.0))
+    assert max(flight.off_goal()[0][-2000:]) < 0.015
 
 
 def test_a_silent_bus_closes_the_valves_and_the_vehicle_lands_when_it_speaks_again(fly):

@@ -1,14 +1,15 @@
 """Fault detector: what the flight process sees wrong with sensors, fixes and valves of its vehicle."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+from groundstation.control.valve_health import HEALTHY, ValveHealth
 from groundstation.declarations.fix import PoseFix
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.fusion.hold_up import HoldUp
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
-from groundstation.parts.supervision.messages import Findings, Supervision
+from groundstation.parts.supervision.messages import Findings, Supervision, ValveShares
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 from groundstation.supervision.fix_watch import FixWatch
 from groundstation.supervision.imu_consistency import ImuConsistency
@@ -23,6 +24,8 @@ HELD_UP_S = 0.03
 """Samples that are later than usual by more come by a line or a machine that is held up; so do commands."""
 LONGEST_HOLE_MS, DISTURBED_NS = 60, 2_000_000_000
 """After a longer hole between samples nothing is judged for a while: filter and stamps settle."""
+VALVES = 8
+"""Of a valve node."""
 MOST_BEHIND, COUNTER_MODULUS = 3, 16
 """Commands, 20 ms each, that the node may be behind."""
 LIFTED_NS = 500_000_000
@@ -43,7 +46,7 @@ class FaultDetector(Node):
     inputs: tuple[type[Message], ...] = (
         Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, PoseFix,
     )  # fmt: skip
-    outputs = (Findings,)
+    outputs = (Findings, ValveShares)
 
     def __init__(
         self,
@@ -66,6 +69,7 @@ class FaultDetector(Node):
         self._node_ns = self._sent = 0
         self._disturbed_ns = -DISTURBED_NS
         self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
+        self._health: Mapping[int, ValveHealth] = {}
         self._published: tuple[str, ...] = ()
         self._published_ns = 0
 
@@ -136,7 +140,7 @@ class FaultDetector(Node):
         return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
 
     def _begin_again(self) -> None:
-        self._valves.reset()
+        """What was found stays: a hole in the samples mends no valve."""
         self._valves.start(self._zeros[1])
 
     def _fix(self, fix: PoseFix, now_ns: int) -> None:
@@ -162,7 +166,19 @@ class FaultDetector(Node):
         for finding in (*self._valves.findings(now_ns), *self._imu.findings):
             before = found.get(finding.id)
             found[finding.id] = finding.detail if before is None else f"{before}; {finding.detail}"
+        if self._valves.health != self._health:
+            self._health = self._valves.health
+            yield self._shares(now_ns)
         ids = tuple(found)
         if ids != self._published or now_ns - self._published_ns >= REPEAT_NS:
             self._published, self._published_ns = ids, now_ns
             yield Findings(now_ns, self.vehicle, ids, tuple(found.values()))
+
+    def _shares(self, now_ns: int) -> ValveShares:
+        health = [self._health.get(valve, HEALTHY) for valve in range(VALVES)]
+        return ValveShares(
+            now_ns,
+            self.vehicle,
+            tuple(valve.open_share for valve in health),
+            tuple(valve.shut_share for valve in health),
+        )

@@ -108,6 +108,21 @@ class Findings(Message):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ValveShares(Message):
+    """What each valve is taken to give, as shares of the rig's thrust: the allocation plans with it; latched.
+
+    Attributes:
+        open_ratio: While commanded open: 1 for a healthy valve.
+        shut_ratio: While commanded shut: 0 for a healthy valve.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValveShares"
+    TOPIC: ClassVar = Topic("valve_shares", rank=Rank.ESTIMATE, latched=True)
+    open_ratio: Float64Sequence
+    shut_ratio: Float64Sequence
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Faults(Message):
     """Every fault that a vehicle has, until it clears; latched. Published when one begins or ends.
 

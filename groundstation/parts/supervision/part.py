@@ -17,7 +17,14 @@ from groundstation.parts.supervision.fault_detector import FaultDetector
 from groundstation.parts.supervision.figures import SupervisionFigure
 from groundstation.parts.supervision.gauges import GAUGES
 from groundstation.parts.supervision.memory import MemoryPort
-from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
+from groundstation.parts.supervision.messages import (
+    Faults,
+    Findings,
+    Recalled,
+    StopPress,
+    Supervision,
+    ValveShares,
+)
 from groundstation.parts.supervision.sections import SupervisionOfVehicle
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
 from groundstation.supervision.imu_consistency import ImuConsistency, ImuConsistencyConfig
@@ -55,7 +62,7 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
         if not {vehicle, ""} & set(nodes[row.answered_by].vehicles(rig))
     }
     others = tuple(name for name in rig.vehicles if name != vehicle)
-    return SupervisorNode(vehicle, supervisor, others, frozenset(rig.tables.actions), absent)
+    return SupervisorNode(vehicle, model, supervisor, others, frozenset(rig.tables.actions), absent)
 
 
 def _detector(rig: Rig, vehicle: str) -> Node:
@@ -96,7 +103,7 @@ def _memory(rig: Rig, vehicle: str) -> Port:
 PART = Part(
     name="supervision",
     summary="modes, stop, faults and the arming gate of each vehicle",
-    topics=(Recalled, StopPress, Supervision, Faults, Findings),
+    topics=(Recalled, StopPress, Supervision, Faults, Findings, ValveShares),
     nodes=(
         NodeRow("supervisor", COMMANDS, Weight.URGENT, SupervisorNode, _supervisor),
         NodeRow("fault_detector", FLIGHT, Weight.LIGHT, FaultDetector, _detector),

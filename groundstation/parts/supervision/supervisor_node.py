@@ -2,7 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 
+from groundstation.control.edge import braking_to_count_on
 from groundstation.control.state import ControlState
+from groundstation.control.valve_health import health_of
+from groundstation.control.vehicle import VehicleModel
+from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
@@ -12,7 +16,14 @@ from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.memory import memory_of
-from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
+from groundstation.parts.supervision.messages import (
+    Faults,
+    Findings,
+    Recalled,
+    StopPress,
+    Supervision,
+    ValveShares,
+)
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.supervision.modes import Event
 from groundstation.supervision.sightings import NodeSeen, Seen
@@ -27,6 +38,7 @@ class SupervisorNode(Node):
 
     Args:
         vehicle: Its name.
+        model: Its mass and valves.
         supervisor: A fresh one.
         others: Names of the other vehicles.
         known: Names of all actions; it refuses what none of them is.
@@ -34,8 +46,8 @@ class SupervisorNode(Node):
     """
 
     inputs = (
-        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, Wrench, Findings,
-        RecorderStatus, Diagnostics,
+        StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveShares, Wrench,
+        Findings, RecorderStatus, Diagnostics,
     )  # fmt: skip
     paced = (VehicleState,)
     outputs = (Supervision, Faults, Ack)
@@ -43,12 +55,14 @@ class SupervisorNode(Node):
     def __init__(
         self,
         vehicle: str,
+        model: VehicleModel,
         supervisor: Supervisor,
         others: tuple[str, ...],
         known: frozenset[str],
         absent: Mapping[str, str],
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
+        self._model = model
         self._supervisor = supervisor
         self._others = others
         self._known = known
@@ -119,6 +133,10 @@ class SupervisorNode(Node):
                 sightings.demand_ns = now_ns
             case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
                 sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns
+            case ValveShares():
+                envelope = WrenchEnvelope(self._model, health_of(message.open_ratio, message.shut_ratio))
+                sightings.braking_m_s2 = braking_to_count_on(self._model, envelope)
+                sightings.missing_thrust = envelope.missing
             case Findings():
                 sightings.findings = dict(zip(message.ids, message.details, strict=True))
                 sightings.findings_ns = now_ns

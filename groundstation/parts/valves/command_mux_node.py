@@ -9,6 +9,7 @@ from groundstation.control.mux import CommandMux, Selection, Source
 from groundstation.control.safety_filter import TURN_RATE, Disc, SafetyFilter, body_force, table_acceleration
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Vector2, clamp
 from groundstation.control.surroundings import Surroundings
+from groundstation.control.valve_health import health_of
 from groundstation.control.vehicle import VehicleModel
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
@@ -16,7 +17,7 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request, answer
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.supervision.messages import Supervision
+from groundstation.parts.supervision.messages import Supervision, ValveShares
 from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.hand_push import HandPush
 from groundstation.parts.valves.messages import Outlook, ValveDemand, ValveSelection
@@ -46,7 +47,7 @@ class CommandMuxNode(Node):
         modulator: Makes pulses.
     """
 
-    inputs = (Wrench, VehicleState, Supervision, Request, Lease)
+    inputs = (Wrench, VehicleState, Supervision, ValveShares, Request, Lease)
     paced = (VehicleState,)
     outputs = (ValveDemand, ValveSelection, Outlook, Ack)
     trigger = Wrench
@@ -93,6 +94,9 @@ class CommandMuxNode(Node):
                 self._see(message, now_ns)
             case Supervision():
                 yield from self._obey(message, now_ns)
+            case ValveShares():
+                self._modulator.take_health(health_of(message.open_ratio, message.shut_ratio))
+                self._braking.envelope = self._modulator.envelope
             case Lease():
                 self._lease.take(message)
             case Request(action="resume") if not self._lease.objection(message, now_ns):

@@ -6,18 +6,27 @@ import math
 import pytest
 
 from groundstation.control.keep_in import rectangle
+from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.operation.messages import RecorderStatus
 from groundstation.parts.supervision.memory import text_of
-from groundstation.parts.supervision.messages import Faults, Findings, Recalled, StopPress, Supervision
+from groundstation.parts.supervision.messages import (
+    Faults,
+    Findings,
+    Recalled,
+    StopPress,
+    Supervision,
+    ValveShares,
+)
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
 
 MS = 1_000_000
+MODEL = VehicleModel(11.0, 0.25, square_of_eight())
 KNOWN = frozenset({"fly", "land", "stop", "go_to", "push", "dance"})
 
 
@@ -30,7 +39,7 @@ class Driven:
             self.known, rest_s=8.0, period_ns=PERIOD_NS, starts_by_itself=starts_by_itself
         )
         self.node = SupervisorNode(
-            "alpha", supervisor, ("beta", "gamma"), KNOWN, {"push": "this vehicle has no command mux"}
+            "alpha", MODEL, supervisor, ("beta", "gamma"), KNOWN, {"push": "this vehicle has no command mux"}
         )
         self.now_ns = 0
         self.number = 0
@@ -181,6 +190,23 @@ class TestWhatItSees:
         assert (seen.pressure_pa, seen.faults) == (30e5, 8)
         node.receive(ValveStatus(2, "alpha", 1, 2, True, False, False, 30e5, 8, 61.0))
         assert node.known.node.arrival_ns == 2, "it waited somewhere: it is as old as its arrival"
+
+    @pytest.mark.parametrize(
+        ("open_ratio", "shut_ratio", "braking_m_s2", "is_missing"),
+        [
+            ([1.0] * 8, [0.0] * 8, 0.9 * 0.44 / 11.0 - 0.005, False),
+            ([0.0] + [1.0] * 7, [0.0] * 8, 0.9 * 0.22 / 11.0 - 0.005, False),
+            ([0.0, 0.0] + [1.0] * 6, [0.0] * 8, 0.0, True),  # nothing pushes forward
+        ],
+    )
+    def test_valves_that_failed_leave_less_to_brake_with(
+        self, node, open_ratio, shut_ratio, braking_m_s2, is_missing
+    ):
+        node.receive(ValveShares(0, "alpha", tuple(open_ratio), tuple(shut_ratio)))
+        assert node.known.braking_m_s2 == pytest.approx(braking_m_s2)
+        assert bool(node.known.missing_thrust) is is_missing
+        found = dict(node.known._thrust())
+        assert ("thrust_missing" in found) is is_missing
 
     def test_demands_and_findings(self, node):
         node.now_ns = 5

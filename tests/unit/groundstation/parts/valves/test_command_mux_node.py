@@ -22,7 +22,7 @@ from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
-from groundstation.parts.supervision.messages import Supervision
+from groundstation.parts.supervision.messages import Supervision, ValveShares
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.messages import Outlook, ValveDemand, ValveSelection
 
@@ -380,6 +380,23 @@ class TestPush:
 
 def test_its_period(mux):
     assert mux.tick_period_ns == 20 * MS
+
+
+class TestValvesThatFailed:
+    def test_the_next_pulses_do_without_them(self, flying):
+        give(flying, 5)
+        list(flying.receive(ValveShares(0, "alpha", (0.0, *[1.0] * 7), (0.0,) * 8), 50 * MS))
+        selection = give(flying, 105)
+        assert selection.on_time_ms[0] == 0
+        assert selection.on_time_ms[1] > pulses(PUSH)[0][1]  # the other one of its face pushes for both
+
+    def test_braking_counts_on_what_is_left(self, flying):
+        list(flying.receive(state(0, (1.0, 0.0), (0.1, 0.0)), 0))
+        list(flying.receive(ValveShares(0, "alpha", (0.0, *[1.0] * 7), (0.0,) * 8), 0))
+        found = [each for step in range(1, 6) for each in flying.tick(step * 20 * MS)]
+        [outlook] = [each for each in found if isinstance(each, Outlook)]
+        braking_m_s2 = 0.9 * 0.22 / 11.0 - 0.005
+        assert outlook.stopping_distance_m == pytest.approx(0.1 * (0.15 + 0.1 / (2.0 * braking_m_s2)))
 
 
 class TestFilter:
