@@ -26,7 +26,8 @@ def refusing(source: Path | str | None = None, aside: Sequence[str] = ()) -> Ite
         yield
     except CalibrationRefusedError as error:
         text = "; ".join([str(error), *aside])
-        raise UsageError(f"{text}." if source is None else f"{source}: {text}.") from error
+        sentence = text if text.endswith("?") else f"{text}."
+        raise UsageError(sentence if source is None else f"{source}: {sentence}") from error
 
 
 def deliver(

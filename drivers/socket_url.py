@@ -1,10 +1,10 @@
-"""Addresses of the form ``socket://host:port``, which pyserial opens but refuses in words of its own."""
+"""Addresses of the form ``scheme://host:port``, which pyserial opens but refuses in words of its own."""
 
 from urllib.parse import urlsplit
 
 from drivers.errors import Refused
 
-_SCHEME = "socket://"
+_SCHEMES = ("socket", "rfc2217")
 _HIGHEST_PORT = 65535
 
 
@@ -14,7 +14,8 @@ def check_socket_url(url: str) -> None:
     Raises:
         Refused: It does, or the port is none.
     """
-    if not url.startswith(_SCHEME):
+    scheme = url.partition("://")[0]
+    if "://" not in url or scheme not in _SCHEMES:
         return
     try:
         parts = urlsplit(url)
@@ -23,5 +24,5 @@ def check_socket_url(url: str) -> None:
         host, port = "", None
     if not host or not port:
         raise Refused(
-            f"{url} is no address of a socket: expected socket://HOST:PORT, PORT 1 to {_HIGHEST_PORT}"
+            f"{url} is no address of a socket: expected {scheme}://HOST:PORT, PORT 1 to {_HIGHEST_PORT}"
         )

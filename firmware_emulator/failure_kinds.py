@@ -119,6 +119,8 @@ FAILURE_KINDS: Mapping[str, FailureKind] = {
                                 {"count": _count(3.0)}),
     "stuck_open_valve": FailureKind("valves", "A valve stays open.", {"valve": _VALVE}),
     "stuck_closed_valve": FailureKind("valves", "A valve does not open.", {"valve": _VALVE}),
+    "open_coil": FailureKind("valves", "A coil is torn: its valve does not open, and the node reports it.",
+                             {"valve": _VALVE}),
     "leaking_valve": FailureKind("valves", "A closed valve leaks.",
                                  {"valve": _VALVE, "fraction": _share(0.1)}),
     "weak_valve": FailureKind("valves", "An open valve gives a share of its thrust.",

@@ -9,6 +9,8 @@ from functools import partial
 import numpy as np
 
 from calibration.imu.figures import draw_residuals
+from calibration.imu.gyro_scale import LARGEST_SCALE, LEAST_SHARE
+from calibration.imu.procedures import gyro_scale_by_turns
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
 from groundstation.fusion.constants import CONSTANTS
@@ -19,17 +21,24 @@ from groundstation.fusion.offline import OfflineSmoother
 
 WIDE_GATE = 60.0
 """While a scale is still unknown, good fixes look worse than they are."""
+MOST_STARTS = 2
+"""A filter that begins anew more often has not followed the flight."""
+LARGEST_ACC_TERM = 0.25
+"""A scale or an axis of the accelerometers further off is none of a sensor."""
 
 
 def constants_of_flight(data: FlightData) -> Outcome:
     """Re-estimate every constant of sensors, mounting, camera delay and slope.
 
     Raises:
-        CalibrationRefusedError: No two fixes agree.
+        CalibrationRefusedError: No two fixes agree, or readings and fixes contradict each other.
     """
     smoother = OfflineSmoother(widened(data.noise))
     _, accounts = estimate(data, smoother)
     quantities = constants(smoother)
+    complaint = _complaint_about(quantities, accounts)
+    if complaint is not None:
+        raise CalibrationRefusedError(f"{complaint}: {_cause(data)}")
     used = [account for account in accounts if account.reason == "used"]
     residual = _residuals(data, smoother, used)
     spread = np.sqrt((residual[:, 1:] ** 2).mean(axis=0))
@@ -45,6 +54,32 @@ def constants_of_flight(data: FlightData) -> Outcome:
         notes={"fixes": len(used), "fixes_refused": len(accounts) - len(used)},
         draw=partial(draw_residuals, residual, np.array([account.nis for account in used])),
     )
+
+
+def _complaint_about(quantities: dict[str, Quantity], accounts: list[FixOutcome]) -> str | None:
+    """Return why these cannot be the constants of a mock-up; None if they can."""
+    starts = sum(account.reason == "starts the estimate again" for account in accounts)
+    used = sum(account.used for account in accounts)
+    if starts > MOST_STARTS or used < LEAST_SHARE * len(accounts):
+        return (
+            f"IMU and fixes do not go together: {used} of {len(accounts)} fixes could be used, and the "
+            f"estimate began anew {starts} times"
+        )
+    for name, found in quantities.items():
+        limit = LARGEST_SCALE if name == "gyro_scale" else LARGEST_ACC_TERM
+        if name.startswith(("gyro_scale", "acc_scale", "acc_cross")) and abs(found.value) > limit:
+            return f"{name} would be {found.value:.3g}, which is none of a sensor"
+    return None
+
+
+def _cause(data: FlightData) -> str:
+    """Return the likely cause, by what the turns say."""
+    try:
+        gyro_scale_by_turns(data)
+    except CalibrationRefusedError as error:
+        if "heading" in str(error) or str(error).startswith("omega"):
+            return str(error)
+    return "look at sign, unit and order of the accelerometers and of x and y"
 
 
 def widened(noise: NoiseModel) -> NoiseModel:

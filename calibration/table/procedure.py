@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from calibration.outcome import CalibrationRefusedError
 from calibration.result import provenance_of
 from calibration.table.equations import FlightPriors, flight_equations
 from calibration.table.from_fit import map_of
@@ -32,7 +33,10 @@ def map_of_sources(
     Raises:
         CalibrationRefusedError: The flights do not suffice.
     """
-    basis = SurfaceBasis.over(bounds_m or _table_of(sources), shortest_wave_m)
+    try:
+        basis = SurfaceBasis.over(bounds_m or _table_of(sources), shortest_wave_m)
+    except ValueError as error:
+        raise CalibrationRefusedError(str(error)) from error
     logs = [log for source in sources for log in source.logs]
     fit = fit_surface([flight_equations(log, basis, PRIORS) for log in logs], basis)
     return fit, map_of(fit, _provenance(fit, sources))

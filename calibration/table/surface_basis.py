@@ -25,6 +25,10 @@ SMOOTHNESS = 3.5
 """Of the Matern covariance. A smoother one believes too much of what it infers beside the lanes."""
 
 
+MOST_MODES = 6_000
+"""Before those of shorter waves are left out; the fit takes the cube of their number."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceBasis:
     """Modes up to a shortest wavelength.
@@ -46,7 +50,8 @@ class SurfaceBasis:
         """Return the modes of a table.
 
         Raises:
-            ValueError: the bounds are not in order, or the wavelength is not a positive number.
+            ValueError: the bounds are not in order, the wavelength is not a positive number, or the modes are
+                too many.
         """
         x_min, x_max, y_min, y_max = bounds_m
         if not (x_min < x_max and y_min < y_max):
@@ -59,6 +64,12 @@ class SurfaceBasis:
         width, depth = x_max - x_min + 2.0 * MARGIN_M, y_max - y_min + 2.0 * MARGIN_M
         kx: Array = math.pi / width * np.arange(1, max(1, int(largest * width / math.pi)) + 1.0)
         ky: Array = math.pi / depth * np.arange(1, max(1, int(largest * depth / math.pi)) + 1.0)
+        if kx.size * ky.size > MOST_MODES:
+            raise ValueError(
+                f"a table of {x_max - x_min:.3g} m x {y_max - y_min:.3g} m with waves down to "
+                f"{shortest_wave_m:g} m takes more numbers than can be fitted: smaller bounds or a longer "
+                "shortest wave are expected"
+            )
         square = kx[:, None] ** 2 + ky[None, :] ** 2
         return cls(bounds_m, shortest_wave_m, kx, ky, np.argwhere(square <= largest**2))
 

@@ -122,7 +122,7 @@ def _open(url: str, baud: int) -> serial.Serial:
         raise NotFound(f"there is no serial port {url}")
     try:
         return serial.serial_for_url(url, baudrate=baud, timeout=0, write_timeout=1.0, exclusive=True)
-    except ValueError as error:
+    except (ValueError, KeyError) as error:  # KeyError: an option of a URL that pyserial does not know
         raise Refused(f"{url} does not open at {baud} Bd: {error}") from error
     except (OSError, serial.SerialException) as error:
         text = str(error)

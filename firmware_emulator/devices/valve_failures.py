@@ -19,19 +19,21 @@ class ValveFailures:
 
     Args:
         vehicle: Whose valves.
-        failures: `stuck_open_valve`, `stuck_closed_valve`, `leaking_valve`, `weak_valve`, `pulsing_valve`,
-            `low_tank`, `low_battery`.
+        failures: `stuck_open_valve`, `stuck_closed_valve`, `open_coil`, `leaking_valve`, `weak_valve`,
+            `pulsing_valve`, `low_tank`, `low_battery`.
         start_ns: Laboratory time that failures count from.
 
     Attributes:
         next_ns: When a valve next opens or closes by itself.
         node_faults: What the node states about itself.
+        coil_mask: Bit i: it sees that the coil of valve i is torn.
     """
 
     def __init__(self, vehicle: Vehicle, failures: Failures, start_ns: int) -> None:
         self._vehicle, self._failures, self._start_ns = vehicle, failures, start_ns
         self.next_ns = FAR_FUTURE_NS
         self.node_faults = NodeFault(0)
+        self.coil_mask = 0
         failures.watch("valves", self._apply)
 
     def run(self, now_ns: int) -> None:
@@ -47,6 +49,9 @@ class ValveFailures:
         low = self._active("low_battery", age_ns)
         self.node_faults = NodeFault.SUPPLY_UNDERVOLTAGE if low else NodeFault(0)
         stuck_closed = {_valve(failure) for failure in self._active("stuck_closed_valve", age_ns)}
+        torn = {_valve(failure) for failure in self._active("open_coil", age_ns)}
+        self.coil_mask = sum(1 << valve for valve in torn)
+        stuck_closed |= torn
         if any(failure.parameters["battery_v"] < OPENS_FROM_V for failure in low):
             stuck_closed.update(range(VALVES))
         stuck_open = {_valve(failure) for failure in self._active("stuck_open_valve", age_ns)}

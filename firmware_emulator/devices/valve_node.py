@@ -226,6 +226,7 @@ class ValveNode:
                 is_dead_man_closed=self._is_dead_man_closed,
                 is_stopped=self._landing.is_stopped,
                 is_float_air_on=self._is_air_on,
+                valve_fault_mask=self._ailments.coil_mask,
                 node_faults=self._ailments.node_faults,
                 rejected_commands=self._rejected & 0xFF,
                 is_stop_pending=self._landing.is_stop_pending,

@@ -17,6 +17,11 @@ from groundstation.data_sets.stamp_words import (
     complaint_about_units,
     notes_of,
 )
+from groundstation.data_sets.value_words import (
+    complaint_about_places,
+    complaint_about_temperatures,
+    without_wild_temperatures,
+)
 from groundstation.files.errors import FileError
 from groundstation.files.json_file import parse_json
 from groundstation.files.number_tables import load_table
@@ -64,12 +69,15 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     _refuse(path, complaint_about_order(imu[:, 0]))
     _refuse(path, complaint_about_units(imu[:, 0], period_s))
     _refuse(path, complaint_about_bunches(imu, period_s))
+    _refuse(path, complaint_about_temperatures(imu[:, 4]))
+    imu[:, 4], notes = without_wild_temperatures(imu[:, 4], table.lines.tolist(), path.name)
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
+        _refuse(folder / "stars.csv", complaint_about_places(stars))
     variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
     covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
-    given = FlightData(imu, stars, covariance, known["run_start_s"], noise)
+    given = FlightData(imu, stars, covariance, known["run_start_s"], noise, notes=notes)
     data = given.screened(lambda found: notes_of(found, imu[:, 0], table.lines.tolist(), path.name))
     stamp_s = data.imu[:, 0]
     _refuse(path, complaint_about_start(stamp_s, known["duration_s"]))

@@ -1,8 +1,18 @@
 """What pydantic finds wrong with a file, in one sentence."""
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from groundstation.declarations.calls import in_one_line, shortened
+
+_OWN_WORDS = {
+    "model_type": "expected a table of keys",
+    "model_attributes_type": "expected a table of keys",
+    "dict_type": "expected a table of keys",
+    "too_short": "expected at least {min_length} of them",
+    "too_long": "expected at most {max_length} of them",
+}
+"""For what pydantic says in words of Python."""
 
 
 def first_sentence(error: ValidationError) -> str:
@@ -11,10 +21,17 @@ def first_sentence(error: ValidationError) -> str:
     typos = [each for each in found if each["type"] == "extra_forbidden"]
     first = (typos or found)[0]
     where = ".".join(str(part) for part in first["loc"] if part != "[key]")
-    message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         return f"'{where}' is no known key (a typo?)"
     if first["type"] == "missing":
         return f"'{where}' is missing"
     value = "" if first["type"] == "value_error" else f", found {shortened(repr(first['input']))}"
-    return in_one_line(f"{where + ': ' if where else ''}{message}{value}")
+    return in_one_line(f"{where + ': ' if where else ''}{message_of(first)}{value}")
+
+
+def message_of(mistake: ErrorDetails) -> str:
+    """What was expected, in words that need no Python."""
+    own = _OWN_WORDS.get(mistake["type"])
+    if own is not None:
+        return own.format(**mistake.get("ctx", {}))
+    return mistake["msg"].removeprefix("Value error, ")

@@ -47,8 +47,12 @@ def check_folder(path: Path) -> None:
         raise FileError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
     if not there.is_dir():
         raise FileError(f"{path}: no such folder can be made, {there} is none.")
-    if not os.access(there, os.W_OK):
-        raise FileError(f"{path}: no such folder can be made, {there} may not be written in.")
+    try:
+        tempfile.TemporaryDirectory(dir=there, prefix=".part.").cleanup()
+    except OSError as error:  # some file systems take no folders though they grant the right
+        raise FileError(
+            f"{path}: no such folder can be made in {there} ({error.strerror or error})."
+        ) from error
 
 
 def write_files(contents: Mapping[Path, Content]) -> None:

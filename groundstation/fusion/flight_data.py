@@ -78,12 +78,12 @@ class FlightData:
         return replace(self, imu=imu, stars=stars, given_s=self.imu[:, 0], odd=odd, notes=notes)
 
     def tidied(self) -> FlightData:
-        """Return the same with packets of rising stamps only, and each finite fix once, by arrival."""
+        """Return the same with packets of rising stamps only, and each finite fix once, as it came first."""
         flight = self.screened()
         imu = flight.imu[np.isfinite(flight.imu[:, 0])]
         order = np.argsort(flight.stars[:, 1], kind="stable")
         stars, covariance = flight.stars[order], flight.covariance[order]
-        _, first = np.unique(stars, axis=0, return_index=True)
+        _, first = np.unique(stars[:, [0, 2, 3, 4]], axis=0, return_index=True)
         once = np.zeros(len(stars), dtype=np.bool_)
         once[first] = True
         once &= np.isfinite(stars).all(axis=1)

@@ -165,7 +165,7 @@ FAULTS: Mapping[str, Fault] = {
               "acceleration against the commands", 10.0,
               ((0.0, _NOTE),), _PERSON, True, True, "Look at pressure and nozzle.", ("weak_valve",)),
         Fault("coil_fault", "The node reports an open or shorted coil.", "fault bits of the valve node", 0.5,
-              ((0.0, _LAND),), _PERSON, True, False, "Look at the coil's wires."),
+              ((0.0, _LAND),), _PERSON, True, False, "Look at the coil's wires.", ("open_coil",)),
         Fault("tank_low", "The tank is nearly empty.", "tank pressure below 30 bar", 1.0,
               ((0.0, _LAND),), _ITSELF, True, True, "Fill the tank.", ("low_tank",)),
         Fault("battery_low", "The supply of the valve node is low.", "fault bits of the valve node", 1.0,

@@ -108,7 +108,9 @@ def _faults() -> Shown:
     text = (
         "Where faults disagree, the strongest response counts. A fault that clears by itself ends once "
         f"it has not been seen for {CLEAR_S:g} s; one that a person clears ends by `release` or `fly`, once "
-        "it is gone. The last column names what `groundstation inject` can do to provoke it."
+        "it is gone. The last column names what `groundstation inject` can do to provoke it. The hub has no "
+        "row: it lives in the launcher, and when that ends every process closes its valves and ends, and the "
+        "valve nodes land by the silence."
     )
     headings = (
         "fault", "what is wrong", "found by", "within", "response", "clears", "keeps it down", "what to do",

@@ -47,8 +47,8 @@ ONLY_ALOFT = frozenset(
     }
 )
 """What is found by how it moves means nothing on the ground, where people lift it and friction holds it."""
-UNDERVOLTAGE = 1
-"""Bit of the valve node's faults."""
+UNDERVOLTAGE, COIL_FAULT = 1, 0x80
+"""Fault bits of the valve node: the lowest, and the one by which the station says that a coil is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,6 +224,8 @@ class Sightings:
             yield "can_flooded", f"{node.bus_rate_hz:.0f} frames a second"
         if node.faults & UNDERVOLTAGE:
             yield "battery_low", "the valve node reports undervoltage"
+        if node.faults & COIL_FAULT:
+            yield "coil_fault", "the valve node reports an open or shorted coil"
 
     def _thrust(self) -> Iterator[tuple[str, str]]:
         if self.missing_thrust:

@@ -51,6 +51,12 @@ def test_every_folder_of_parts_is_installed():
     assert folders == set(PARTS)
 
 
+def test_every_part_is_held_apart_from_the_others():
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    apart = next(each["modules"] for each in contracts if each["type"] == "independence")
+    assert {module.rpartition(".")[2] for module in apart} == set(PARTS)
+
+
 @pytest.mark.parametrize("what", ["topics", "nodes", "actions", "fix_sources"])
 def test_no_name_is_declared_twice(what):
     names = [

@@ -1,12 +1,13 @@
 """The tables of supervision: modes, transitions, faults and checks are complete and fit each other."""
 
 import itertools
+from pathlib import Path
 
 import pytest
 
 from firmware_emulator.device_table import device_kinds, failure_kinds
 from groundstation.parts.supervision.actions import ACTIONS
-from groundstation.supervision import arming
+from groundstation.supervision import arming, modes
 from groundstation.supervision.faults import FAULTS, Clears, Response
 from groundstation.supervision.mode_machine import ModeMachine
 from groundstation.supervision.modes import (
@@ -149,6 +150,14 @@ def test_its_response_begins_at_once_and_only_grows(fault):
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=lambda fault: fault.id)
 def test_its_failures_can_be_injected(fault):
     assert set(fault.failures) <= set(failure_kinds(device_kinds()))
+
+
+def test_every_fault_is_found_by_something():
+    package = Path(modes.__file__).parents[1]
+    folders = (package / "supervision", package / "parts")
+    code = [path for folder in folders for path in folder.rglob("*.py") if path.name != "faults.py"]
+    text = "".join(path.read_text() for path in code)
+    assert [fault for fault in FAULTS if f'"{fault}"' not in text] == []
 
 
 def test_what_a_person_must_clear_keeps_it_down_or_has_brought_it_down():

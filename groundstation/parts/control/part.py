@@ -12,6 +12,7 @@ from groundstation.control.state import Goal
 from groundstation.declarations.node import FLIGHT, Node, NodeRow, Weight
 from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
+from groundstation.declarations.validation import message_of
 from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.controller_node import ControllerNode
 from groundstation.parts.control.gauges import GAUGES, StationFigure
@@ -116,7 +117,7 @@ def _first(error: ValidationError) -> str:
     where = ".".join(map(str, first["loc"]))
     if first["type"] == "extra_forbidden":
         return f"{where}: is no parameter of this controller (a typo?)"
-    return f"{where}: {first['msg'].removeprefix('Value error, ')}, found {first['input']!r}"
+    return f"{where}: {message_of(first)}, found {first['input']!r}"
 
 
 PART = Part(

@@ -143,7 +143,7 @@ class ValveStatus(Message):
         dead_man: The node closed its valves because nobody spoke to it.
         floating: The float air is on.
         pressure_pa: Tank pressure, NaN before the first report.
-        faults: Fault bits.
+        faults: Fault bits as the node reports them; bit 7: it reports an open or shorted coil.
         bus_rate_hz: Frames that arrive from the bus, of all nodes together.
     """
 

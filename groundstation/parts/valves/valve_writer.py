@@ -10,6 +10,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
+from groundstation.supervision.sightings import COIL_FAULT
 
 FLOAT_RETRY_NS = 100_000_000
 COUNTED_NS = 250_000_000
@@ -90,7 +91,7 @@ class ValveWriter(Node):
                     reported.is_dead_man_closed,
                     reported.is_float_air_on,
                     self._pressure_pa,
-                    reported.node_faults,
+                    reported.node_faults | (COIL_FAULT if reported.valve_fault_mask else 0),
                     self._bus_rate_hz,
                 )
 

@@ -132,6 +132,20 @@ def test_a_low_battery_is_reported_and_below_9_v_no_valve_opens(battery_v, opens
     assert list(faults.values()) == [{NodeFault(0)}, {NodeFault.SUPPLY_UNDERVOLTAGE}, {NodeFault(0)}]
 
 
+@pytest.mark.parametrize("valve", [0, 1, 7])
+def test_a_torn_coil_is_reported_and_its_valve_does_not_open(valve):
+    row = {"kind": "open_coil", "start_s": 0.2, "end_s": 0.8, "parameters": {"valve": valve}}
+    laboratory, received = flight([row], PAIR, seconds=0.7)
+    healthy, _ = flight([], PAIR, seconds=0.7)
+    assert (bank(laboratory).wrench[0] < 0.8 * bank(healthy).wrench[0]) == (valve in (0, 1))
+    _, received = flight([row], PAIR)
+    masks = {
+        span: {status.valve_fault_mask for status in of(ValveStatus, received, *span)}
+        for span in ((0, 200 * MS), (220 * MS, 800 * MS), (830 * MS, S))
+    }
+    assert list(masks.values()) == [{0}, {1 << valve}, {0}]
+
+
 @pytest.mark.parametrize("rate_hz", [50.0, 1000.0, 2500.0])
 def test_a_flooded_bus_carries_foreign_frames_at_the_rate_and_status_all_the_same(rate_hz):
     row = {"kind": "flooded_bus", "start_s": 0.2, "end_s": 0.8, "parameters": {"rate_hz": rate_hz}}

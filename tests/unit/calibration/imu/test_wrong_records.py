@@ -40,6 +40,12 @@ def rest(make_folder, tmp_path, groundstation):
 
 
 @pytest.fixture
+def laps(make_folder, tmp_path, groundstation):
+    folder = make_folder(scenario="perimeter", seed=51, duration_s=80.0)
+    return Record(folder, tmp_path / "laps", groundstation)
+
+
+@pytest.fixture
 def spin(make_folder, tmp_path, groundstation):
     return Record(make_folder(scenario="spin", seed=52, duration_s=60.0), tmp_path / "spin", groundstation)
 
@@ -277,3 +283,101 @@ def test_what_the_gyro_turned_in_a_hole_is_not_guessed(spin, command, name, spoi
     found = spin.calibrate(command)[name]
     assert found["value"] == pytest.approx(plain["value"], abs=3.0 * found["std"])
     assert found["std"] < 2.5 * plain["std"]
+
+
+def headings_negated(record):
+    record.stars[:, 4] *= -1.0
+
+
+def headings_in_degrees(record):
+    record.stars[:, 4] *= 57.3
+
+
+def fixes_frozen(record):
+    record.stars[:, 2:] = record.stars[0, 2:]
+
+
+def places_mirrored(record):
+    record.stars[:, 2] *= -1.0
+
+
+def gyro_in_degrees(record):
+    record.imu[:, 1] *= 57.3
+
+
+def gyro_of_another_scale(record):
+    record.imu[:, 1] *= 1.2
+
+
+def accelerometers_in_g(record):
+    record.imu[:, 2:4] /= 9.81
+
+
+def accelerometers_negated(record):
+    record.imu[:, 2:4] *= -1.0
+
+
+def accelerometers_swapped(record):
+    record.imu[:, 2:4] = record.imu[:, 3:1:-1].copy()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "cause"),
+    [
+        (headings_negated, "the sign of one of them is wrong"),
+        (headings_in_degrees, "seem to be degrees"),
+        (fixes_frozen, r"frozen fixes\?$"),
+        (gyro_in_degrees, "deg/s"),
+        (gyro_of_another_scale, "the best scale is 0.16"),
+    ],
+)
+def test_joint_constants_that_cannot_be_right_are_refused_with_the_likely_cause(spin, spoil, cause):
+    spoil(spin)
+    with pytest.raises(UsageError, match=cause):
+        spin.calibrate("joint")
+    assert not (spin.folder / "found.toml").exists()
+
+
+@pytest.mark.parametrize(
+    "spoil", [places_mirrored, accelerometers_in_g, accelerometers_negated, accelerometers_swapped]
+)
+def test_joint_constants_of_axes_that_contradict_each_other_are_refused(laps, spoil):
+    spoil(laps)
+    with pytest.raises(UsageError, match="sign, unit and order of the accelerometers and of x and y"):
+        laps.calibrate("joint")
+    assert not (laps.folder / "found.toml").exists()
+
+
+def test_a_temperature_that_no_chip_has_costs_itself_and_is_reported(rest):
+    rest.imu[:, 4] = np.linspace(20.0, 26.0, len(rest.imu))
+    right = rest.calibrate("temperature")
+    rest.imu[::50, 4] = 9249.0
+    found = rest.calibrate("temperature")
+    assert f"{len(rest.imu[::50])} of {len(rest.imu)} temperatures set aside" in rest.output
+    for name in ("omega_slope", "ax_slope", "ay_slope"):
+        assert found[name]["value"] == pytest.approx(right[name]["value"], abs=0.5 * right[name]["std"])
+
+
+@pytest.mark.parametrize("command", ["temperature", "zero-offset"])
+def test_temperatures_in_kelvin_are_refused(rest, command):
+    rest.imu[:, 4] += 273.15
+    with pytest.raises(FileError, match=r"imu\.csv: temperature_C is 29\d.* degrees Celsius are expected"):
+        rest.calibrate(command)
+
+
+@pytest.mark.parametrize("command", ["joint", "table-map", "gyro-scale"])
+@pytest.mark.parametrize("factor", [1e3, 1e2])
+def test_places_in_other_units_are_refused(spin, command, factor):
+    spin.stars[:, 2:4] = (spin.stars[:, 2:4] + 1.0) * factor
+    with pytest.raises(FileError, match=r"stars\.csv: x_m and y_m are .* Metres are expected"):
+        spin.calibrate(command)
+
+
+def test_an_exposure_that_arrives_again_later_counts_once(spin):
+    once = spin.calibrate("gyro-scale")
+    again = spin.stars.copy()
+    again[:, 1] += 0.01
+    spin.stars = np.concatenate([spin.stars, again])
+    found = spin.calibrate("gyro-scale")
+    assert found["scale"]["std"] == pytest.approx(once["scale"]["std"], rel=1e-9)
+    assert f"{len(again)} fixes that came twice" in spin.output

@@ -122,9 +122,15 @@ def test_wrong_inputs_are_refused_and_nothing_is_written(run, folder, tmp_path):
     ):
         with pytest.raises(refusal, match=complaint):
             run(path, "--out", tmp_path / "map.toml", "--plot", tmp_path / "map.png")
+    stars = (folder / "stars.csv").read_text()
     (folder / "stars.csv").write_text("t_exposure_s,t_arrival_s,x_m,y_m,heading_rad\n1,2,0,0,0\n2,3,1,1,1\n")
     with pytest.raises(UsageError, match="never had a pose"):
         run(folder, "--out", tmp_path / "map.toml")
+    (folder / "stars.csv").write_text(stars)
+    with pytest.raises(
+        UsageError, match=r"a table of 180 m x 180 m .* takes more numbers than can be fitted"
+    ):
+        run(folder, "--out", tmp_path / "map.toml", "--bounds", "-90,90,-90,90")
     with pytest.raises(FileError, match="there is no folder"):
         run(folder, "--out", tmp_path / "nowhere" / "map.toml")
     assert [path.name for path in tmp_path.iterdir()] == ["laps"]

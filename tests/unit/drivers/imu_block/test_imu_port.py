@@ -134,12 +134,17 @@ def test_a_port_that_is_not_there_is_named():
         SerialPort("socket://127.0.0.1:1")
 
 
-@pytest.mark.parametrize(
-    "url", ["socket://host", "socket://", "socket://:5", "socket://host:x", "socket://h:70000"]
-)
-def test_a_socket_without_a_port_is_refused_in_a_sentence(url):
-    with pytest.raises(Refused, match=r"^socket://.* is no address of a socket: expected socket://HOST:PORT"):
-        SerialPort(url)
+@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
+@pytest.mark.parametrize("rest", ["host", "", ":5", "host:x", "h:70000"])
+def test_a_socket_without_a_port_is_refused_in_a_sentence(scheme, rest):
+    words = rf"^{scheme}://.* is no address of a socket: expected {scheme}://HOST:PORT"
+    with pytest.raises(Refused, match=words):
+        SerialPort(f"{scheme}://{rest}")
+
+
+def test_an_option_that_pyserial_does_not_know_is_refused_in_a_sentence():
+    with pytest.raises(Refused, match=r"^loop://\?logging=x does not open at 250000 Bd: "):
+        SerialPort("loop://?logging=x")
 
 
 def test_the_timer_is_what_the_kernel_reports(line, tmp_path, monkeypatch):

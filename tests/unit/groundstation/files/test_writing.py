@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +47,10 @@ def test_targets_are_refused_before_any_work(tmp_path):
             check_targets(bad)
         with pytest.raises(FileError, match="no such folder can be made"):
             check_folder(bad)
+    with pytest.raises(FileError, match="no such folder can be made in /proc"):  # ours to write in, it says
+        check_folder(Path("/proc/x"))
+    check_folder(tmp_path / "new" / "report")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_a_pipe_or_a_device_is_never_replaced_by_a_file(tmp_path):

@@ -201,6 +201,16 @@ def test_what_is_no_rig_file_is_one_sentence(tmp_path, content, sentence):
         ("baud = 250000", "baud = 9600", "mock_ups.standard.imu.baud: "),
         ("bus_index", "bus_idx", "'vehicles.alpha.bus_idx' is no known key (a typo?)"),
         ("[vehicles.alpha]", "[vehicles.Alpha]", "vehicles.Alpha: "),
+        (
+            "hold = { x_m = 0.2, y_m = 0.1, heading_deg = 0.0 }",
+            "hold = [0.2, 0.1, 0.0]",
+            "vehicles.alpha.hold: expected a table of keys, found [0.2, 0.1, 0.0]",
+        ),
+        (
+            "[vehicles.alpha]\n",
+            '[vehicles.alpha]\ncontrol = { controller = "path", parameters = { waypoints_m = [] } }\n',
+            "vehicles.alpha.control.parameters.waypoints_m: expected at least 1 of them, found []",
+        ),
     ],
 )
 def test_a_mistake_is_one_sentence_with_file_and_key(tmp_path, old, new, sentence):

@@ -152,6 +152,12 @@ class TestSupplies:
         expected = {"battery_low": "the valve node reports undervoltage"}
         assert found(known) == (expected if is_low else {})
 
+    @pytest.mark.parametrize(("bits", "is_reported"), [(0, False), (127, False), (128, True), (129, True)])
+    def test_a_coil_that_the_node_reports_is_the_highest_fault_bit(self, known, node, bits, is_reported):
+        known.node = node(20 * S, armed=True, floating=True, faults=bits)
+        detail = found(known).get("coil_fault")
+        assert detail == ("the valve node reports an open or shorted coil" if is_reported else None)
+
     def test_of_a_node_that_never_reported_nothing_is_known(self, known):
         known.node = None
         assert set(found(known)) == {"can_silent"}

@@ -121,6 +121,13 @@ class TestReports:
         assert (reported.armed, reported.dead_man, reported.floating) == (True, False, True)
         assert math.isnan(reported.pressure_pa)
 
+    def test_a_coil_of_any_valve_is_told_by_the_highest_fault_bit(self, writer):
+        for valve in range(8):
+            (reported,) = arrive(writer, status(valve_fault_mask=1 << valve))
+            assert reported.faults == 0x80 | 1
+        (reported,) = arrive(writer, status(valve_fault_mask=0))
+        assert reported.faults == 1
+
     def test_the_newest_tank_pressure_comes_with_it(self, writer):
         assert arrive(writer, bus.TankPressure(INDEX, 50e5, 6e5)) == []
         assert arrive(writer, bus.TankPressure(INDEX + 1, 90e5, 6e5)) == []
