@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.campaign.errors import CampaignError
-from groundstation.scenario.compiling import expanded, groups_of
+from groundstation.scenario.compiling import groups_of
 from groundstation.scenario.dispersions import Drawn, draw, expanded_keys, laboratory_seed
 from groundstation.scenario.flight_log import FlightLog
 from groundstation.scenario.judging import flown
+from groundstation.scenario.limits import expanded
 from groundstation.scenario.loading import Scenario
 from groundstation.scenario.quantities import QUANTITIES
 

@@ -126,7 +126,7 @@ class Rows:
                 row = json.loads(line)
             except ValueError:
                 continue  # torn: flown again
-            if isinstance(row, dict) and tuple(row) == self._columns and str(row["run"]).isdigit():
+            if isinstance(row, dict) and tuple(row) == self._columns and str(row["run"]).isdecimal():
                 known.setdefault(int(row["run"]), row)
         return known
 

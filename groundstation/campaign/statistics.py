@@ -10,7 +10,8 @@ from scipy.stats import spearmanr
 
 from groundstation.campaign.flying import Row
 from groundstation.campaign.plan import Plan, limit_columns
-from groundstation.scenario.compiling import expanded, groups_of
+from groundstation.scenario.compiling import groups_of
+from groundstation.scenario.limits import expanded
 from groundstation.scenario.loading import Scenario
 from groundstation.watch.verdict import ERROR, PASSED
 

@@ -4,7 +4,6 @@ Everything that can be known before anything moves is checked here; each mistake
 key and what was expected.
 """
 
-import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -15,8 +14,8 @@ from groundstation.parts.supervision.sections import SupervisionOfVehicle
 from groundstation.rig.variation import varied
 from groundstation.scenario.key_trouble import KeyTroubleError
 from groundstation.scenario.places import check_places, check_starts
-from groundstation.scenario.scenario_file import ALL, FOLLOWERS, Limit, ScenarioFile
-from groundstation.scenario.timeline import Changes, Groups, members, timeline_rows
+from groundstation.scenario.scenario_file import ALL, FOLLOWERS, ScenarioFile
+from groundstation.scenario.timeline import Changes, timeline_rows
 
 OWN_SECTION = "scenario"
 
@@ -37,6 +36,7 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
         if name not in rig.vehicles:
             raise KeyTroubleError(f"vehicles.{name}: the rig has no such vehicle (it has: {_listed(rig)})")
     check_starts(file, rig)
+    _check_changes(file, rig)
     changed = varied(rig, _changes(file, rig, is_hardware=is_hardware))
     check_places(file, changed)
     groups = groups_of(changed)
@@ -52,7 +52,7 @@ def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> 
         "resumed": [name for name in starters if _has_program(changed, name)],
         "timeline": list(timeline_rows(file, changed, groups)),
     }
-    return varied(changed, {OWN_SECTION: section})
+    return varied(changed, {**_waiting(changed), OWN_SECTION: section})
 
 
 def groups_of(rig: Rig) -> dict[str, tuple[str, ...]]:
@@ -62,25 +62,54 @@ def groups_of(rig: Rig) -> dict[str, tuple[str, ...]]:
     return {**groups, ALL: tuple(rig.vehicles), FOLLOWERS: followers}
 
 
-def expanded(limit: Limit, number: int, groups: Groups) -> list[tuple[str, ...]]:
-    """Vehicles, or pairs of them, that a limit holds for.
+def _check_changes(file: ScenarioFile, rig: Rig) -> None:
+    """What would change nothing, or more than is meant, is a mistake.
 
     Raises:
-        KeyTroubleError: It names a vehicle that is not there.
+        KeyTroubleError: A key is written without quotes, or what it changes does not fly.
     """
-    key = f"limits.{number}"
-    if limit.vehicles is not None:
-        names = [name for word in limit.vehicles for name in members(f"{key}.vehicles", word, groups)]
-        return list(itertools.combinations(dict.fromkeys(names), 2)) if len(names) > 1 else [(names[0],)]
-    assert limit.vehicle is not None
-    return [(name,) for name in members(f"{key}.vehicle", limit.vehicle, groups)]
+    for key, value in file.changes.items():
+        names = key.split(".")
+        if names[0] == OWN_SECTION:
+            raise KeyTroubleError(f"changes.{key}: '{OWN_SECTION}' is what the timeline is written into")
+        if len(names) == 1 and isinstance(value, Mapping):
+            inside = next((inner for inner, _ in _leaves(key, value)), f"{key}.…")
+            raise KeyTroubleError(f'changes.{key}: write the whole key in quotes, "{inside}" = …')
+        keys = file.vehicles.get(names[1]) if names[0] == "vehicles" and len(names) > 2 else None
+        own = {"hold": "start", "control": "control"}.get(names[2], "") if keys is not None else ""
+        if own and getattr(keys, own) is not None:
+            raise KeyTroubleError(
+                f"changes.{key}: vehicles.{names[1]}.{own} stands in its place: change that"
+            )
+        if names[0] == "mock_ups" and names[2:3] == ["control"] and not _flown_by_type(file, rig, names[1]):
+            raise KeyTroubleError(
+                f"changes.{key}: changes nothing, each {names[1]!r} has a controller of its own: "
+                "vehicles.….control"
+            )
+
+
+def _flown_by_type(file: ScenarioFile, rig: Rig, mock_up: str) -> bool:
+    """Whether the controller of a type flies any vehicle; true for a type that is not there."""
+    of_type = [name for name, vehicle in rig.vehicles.items() if vehicle.mock_up == mock_up]
+    own = {name for name, keys in file.vehicles.items() if keys.control is not None}
+    ways = [key.split(".") for key in file.changes]
+    own |= {way[1] for way in ways if way[0] == "vehicles" and way[2:3] == ["control"]}
+    return not of_type or any(
+        name not in own and control_of(rig, name)[1].startswith("mock_ups.") for name in of_type
+    )
+
+
+def _waiting(rig: Rig) -> Changes:
+    """Programs begin at t = 0, whoever chose them."""
+    return {
+        f"vehicles.{name}.control": {**control_of(rig, name)[0].model_dump(), "waits": True}
+        for name in rig.vehicles
+    }
 
 
 def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
     changes: Changes = {}
     for key, value in file.changes.items():
-        if key.partition(".")[0] == OWN_SECTION:
-            raise KeyTroubleError(f"changes.{key}: '{OWN_SECTION}' is what the timeline is written into")
         if not (is_hardware and key.startswith("laboratory.")):
             changes[key] = value
     for name, keys in file.vehicles.items():
@@ -94,13 +123,6 @@ def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
             changes[f"laboratory.{name}.start_m"] = [keys.start.x_m, keys.start.y_m]
             changes[f"laboratory.{name}.start_heading_deg"] = keys.start.heading_deg
         changes |= dict(_leaves(f"laboratory.{name}", keys.laboratory))
-    for name in rig.vehicles:  # programs begin at t = 0, whoever chose them
-        keys_of = file.vehicles.get(name)
-        if keys_of is not None and keys_of.control is not None:
-            changes[f"vehicles.{name}.control"]["waits"] = True
-        else:
-            section = control_of(rig, name)[0]
-            changes[f"vehicles.{name}.control"] = {**section.model_dump(), "waits": True}
     return changes
 
 

@@ -96,7 +96,7 @@ def _value(scenario: Scenario, key: str) -> object:
             return getattr(scenario.rig.vehicles[names[1]].hold, names[3], None)
         found: object = scenario.content
         for name in names:
-            if isinstance(found, list) and name.isdigit() and int(name) < len(found):
+            if isinstance(found, list) and name.isdecimal() and int(name) < len(found):
                 found = found[int(name)]
             else:
                 found = found.get(name) if isinstance(found, dict) else None

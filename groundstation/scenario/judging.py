@@ -2,19 +2,16 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from groundstation.control.follow import FollowConfig
-from groundstation.declarations.rig import Rig
-from groundstation.parts.control.sections import control_of
 from groundstation.parts.scenario.messages import ENDED
-from groundstation.parts.scenario.part import bounds_of
 from groundstation.parts.scenario.player import STARTED_AGAIN
-from groundstation.scenario.compiling import expanded, groups_of
+from groundstation.scenario.compiling import groups_of
 from groundstation.scenario.flight_log import FlightLog
+from groundstation.scenario.limits import expanded, nothing_flown
 from groundstation.scenario.loading import Scenario
 from groundstation.scenario.quantities import QUANTITIES, every_quantity
-from groundstation.scenario.run_tracks import Keeps, RunTracks, Span, Value
+from groundstation.scenario.run_tracks import RunTracks, Span, Value
 from groundstation.supervision.modes import Mode
 from groundstation.watch.verdict import FAILED, PASSED, LimitOutcome, Verdict
 
@@ -74,24 +71,12 @@ def _verdict(
 
 def flown(scenario: Scenario, log: FlightLog) -> RunTracks:
     """What the quantities of a run are made from."""
-    rig = scenario.rig
-    return RunTracks(
-        log.tracks(),
-        log.events(),
-        bounds_of(rig),
-        tuple((each.x_m, each.y_m, each.radius_m) for each in scenario.file.obstacles),
-        {name: rig.type_of(name).valves.thrust_n for name in rig.vehicles},
-        dict(_keeps(rig)),
-        min(scenario.file.duration_s, (log.last_ns - (log.zero_ns or 0)) * 1e-9),
+    return replace(
+        nothing_flown(scenario.file, scenario.rig),
+        tracks=log.tracks(),
+        events=log.events(),
+        duration_s=min(scenario.file.duration_s, (log.last_ns - (log.zero_ns or 0)) * 1e-9),
     )
-
-
-def _keeps(rig: Rig) -> Iterator[tuple[str, Keeps]]:
-    for name in rig.vehicles:
-        section = control_of(rig, name)[0]
-        if section.controller == "follow":
-            config = FollowConfig.model_validate(section.parameters)
-            yield name, Keeps(config.leader, config.distance_m, config.face)
 
 
 def _outcomes(scenario: Scenario, seen: RunTracks) -> Iterator[LimitOutcome]:

@@ -11,11 +11,13 @@ import tomli_w
 from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.files.reading import path_of
+from groundstation.parts.control.sections import control_of
 from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
 from groundstation.rig.read import load_rig, read_text, source_of
 from groundstation.rig.variation import varied
-from groundstation.scenario.compiling import compiled_rig, expanded, groups_of
+from groundstation.scenario.compiling import compiled_rig, groups_of
 from groundstation.scenario.key_trouble import KeyTroubleError
+from groundstation.scenario.limits import check_limits
 from groundstation.scenario.scenario_file import WHAT, ScenarioError, ScenarioFile, content_of, parse_content
 
 OF_VEHICLE = ("start", "control", "laboratory", "may_land")
@@ -66,7 +68,7 @@ class Scenario:
         content = deepcopy(self.content)
         for key, value in changes.items():
             if is_of_scenario(key):
-                _set(content, key, value, self.path, self.base)
+                _set(content, key, value, self)
             else:
                 content.setdefault("changes", {})[key] = value
         return made(content, self.path, self.base)
@@ -137,9 +139,7 @@ def is_of_scenario(key: str) -> bool:
 def _compiled(file: ScenarioFile, path: Path, base: Rig, *, is_hardware: bool = False) -> Rig:
     try:
         rig = compiled_rig(file, base, is_hardware=is_hardware)
-        groups = groups_of(rig)
-        for number, limit in enumerate(file.limits):
-            expanded(limit, number, groups)
+        check_limits(file, rig, groups_of(rig))
         return rig
     except KeyTroubleError as error:
         raise ScenarioError(f"{path}: {error}") from error
@@ -148,19 +148,23 @@ def _compiled(file: ScenarioFile, path: Path, base: Rig, *, is_hardware: bool = 
         raise ScenarioError(f"{path}: {str(error).removeprefix(prefix)}") from error
 
 
-def _set(content: dict[str, Any], key: str, value: object, path: Path, base: Rig) -> None:
+def _set(content: dict[str, Any], key: str, value: object, scenario: Scenario) -> None:
     *way, last = key.split(".")
     found: Any = content
-    if way[:1] == ["vehicles"] and way[2:] == ["start"] and way[1] in base.vehicles:
+    if way[:1] == ["vehicles"] and way[1] in scenario.rig.vehicles:  # what the file leaves to its rig
         keys = content.setdefault("vehicles", {}).setdefault(way[1], {})
-        keys.setdefault("start", base.vehicles[way[1]].hold.model_dump())
+        if way[2:] == ["start"]:
+            keys.setdefault("start", scenario.rig.vehicles[way[1]].hold.model_dump())
+        elif way[2:3] == ["control"]:
+            section = control_of(scenario.rig, way[1])[0]
+            keys.setdefault("control", section.model_dump(include={"controller", "parameters"}))
     for place, name in enumerate(way):
         if isinstance(found, list):
-            found = found[int(name)] if name.isdigit() and int(name) < len(found) else None
+            found = found[int(name)] if name.isdecimal() and int(name) < len(found) else None
         elif isinstance(found, dict):
             found = found.setdefault(name, {}) if way[:1] == ["vehicles"] else found.get(name)
         if not isinstance(found, dict | list):
-            raise UsageError(f"{path}: {'.'.join(way[: place + 1])}: the scenario has no such table")
+            raise UsageError(f"{scenario.path}: {'.'.join(way[: place + 1])}: the scenario has no such table")
     if not isinstance(found, dict):
-        raise UsageError(f"{path}: {key}: the scenario has no such key")
+        raise UsageError(f"{scenario.path}: {key}: the scenario has no such key")
     found[last] = value

@@ -5,6 +5,7 @@ which it was reached; NaN where there is nothing to make it from, infinite where
 """
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -22,12 +23,14 @@ class Quantity:
         of: Computes it for the vehicles over a span.
         is_of_pair: Of two vehicles; otherwise of one.
         applies: Whether a vehicle has it at all: only then it is a column of a campaign.
+        least: No value is below.
     """
 
     summary: str
     of: Callable[[RunTracks, tuple[str, ...], Span], Value]
     is_of_pair: bool = False
     applies: Callable[[RunTracks, str], bool] = lambda flown, vehicle: True
+    least: float = 0.0
 
 
 def _follows(flown: RunTracks, vehicle: str) -> bool:
@@ -73,13 +76,16 @@ QUANTITIES: Mapping[str, Quantity] = {
     "settling_s": Quantity("from the last goal until it has settled", deviations.settling_s),
     "overshoot_mm": Quantity("beyond the goal along the way", deviations.overshoot_mm),
     "gas_ns": Quantity("impulse of all valves, newton-seconds", _gas_ns),
-    "least_edge_mm": Quantity("from the hull to the table's edge", clearances.least_edge_mm),
+    "least_edge_mm": Quantity("from the hull to the table's edge", clearances.least_edge_mm, least=-math.inf),
     "least_obstacle_mm": Quantity(
         "from the hull to an obstacle",
         clearances.least_obstacle_mm,
         applies=_has_obstacles,
+        least=-math.inf,
     ),
-    "least_distance_mm": Quantity("between two hulls", clearances.least_distance_mm, is_of_pair=True),
+    "least_distance_mm": Quantity(
+        "between two hulls", clearances.least_distance_mm, is_of_pair=True, least=-math.inf
+    ),
     "contacts": Quantity("a hull touches an edge, an obstacle or another hull", clearances.contacts),
     "estimate_error_rms_mm": Quantity("of the position, by truth", deviations.estimate_error_rms_mm),
     "estimate_error_max_mm": Quantity("of the position, by truth", deviations.estimate_error_max_mm),

@@ -105,7 +105,7 @@ class Limit(Section):
 
     what: str
     vehicle: str | None = None
-    vehicles: tuple[str, ...] | None = None
+    vehicles: tuple[str, ...] | None = Field(default=None, min_length=1)
     from_s: Seconds = 0.0
     to_s: Span | None = None
     below: float | None = None
@@ -121,11 +121,10 @@ class Limit(Section):
             raise ValueError("give 'below' or 'above'")
         if (self.vehicle is None) == (self.vehicles is None):
             raise ValueError("give either 'vehicle' or 'vehicles'")
-        row = QUANTITIES[self.what]
-        if row.is_of_pair and self.vehicles is None and self.vehicle not in (ALL, FOLLOWERS):
-            raise ValueError(f"{self.what} is between two vehicles: give 'vehicles'")
-        if row.is_of_pair and self.vehicles is not None and len(set(self.vehicles)) < 2:
-            raise ValueError(f"{self.what} is between two vehicles, found {list(self.vehicles)}")
+        if self.below is not None and self.below <= QUANTITIES[self.what].least:
+            raise ValueError(f"below = {self.below:g} can never hold: {self.what} is never negative")
+        if self.below is not None and self.above is not None and self.above >= self.below:
+            raise ValueError(f"above = {self.above:g} and below = {self.below:g} can never both hold")
         if self.to_s is not None and self.to_s <= self.from_s:
             raise ValueError(f"from_s = {self.from_s:g} is not before to_s = {self.to_s:g}")
         return self
