@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
@@ -49,9 +49,10 @@ def _flown_until_broken(package: Package, waiting: deque[int], workers: int, tak
     )
     try:
         while waiting or flying:
-            while waiting and len(flying) < workers:
-                run = waiting.popleft()
-                flying[pool.submit(fly_run, package, run)] = run
+            with _quiet():
+                while waiting and len(flying) < workers:
+                    run = waiting.popleft()
+                    flying[pool.submit(fly_run, package, run)] = run
             for future in wait(flying, return_when=FIRST_COMPLETED).done:
                 row = future.result()
                 take(flying.pop(future), row)
@@ -62,6 +63,16 @@ def _flown_until_broken(package: Package, waiting: deque[int], workers: int, tak
             _end(pool)
         pool.shutdown(wait=True, cancel_futures=True)
     return []
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Let processes begin with Ctrl-C held off: it is their parent's to answer, also while they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _saved(flying: dict[Future[Row], int], take: Take) -> list[int]:
@@ -83,8 +94,7 @@ def _end(pool: ProcessPoolExecutor) -> None:
 
 
 def _begin(package: Package) -> None:
-    """A worker begins: Ctrl-C is its parent's to answer, and it does not outlive its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """A worker begins; it does not outlive its parent."""
     parent = parent_process()
     assert parent is not None
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.campaign.errors import CampaignError
+from groundstation.recording.software import software
+from groundstation.rig.provenance import file_hashes
+from groundstation.rig.read import source_of
 from groundstation.scenario.compiling import groups_of
 from groundstation.scenario.dispersions import Drawn, draw, expanded_keys, laboratory_seed
 from groundstation.scenario.flight_log import FlightLog
@@ -119,4 +122,11 @@ def parse_sweep(text: str) -> Sweep:
 def identity(scenario: Scenario, plan: Plan) -> Mapping[str, object]:
     """What has to be equal for a campaign to be continued, beside the number of its runs."""
     swept = None if plan.sweep is None else [plan.sweep.key, list(plan.sweep.values), plan.runs]
-    return {"scenario": scenario.content, "seed": plan.seed, "sweep": swept}
+    return {
+        "scenario": scenario.content,
+        "rig": source_of(scenario.base).content,
+        "files": file_hashes(scenario.base),
+        "software": software(),
+        "seed": plan.seed,
+        "sweep": swept,
+    }

@@ -4,7 +4,9 @@
 beside it, which is gone when all are in order. A line that a crash has torn is flown again.
 """
 
+import contextlib
 import csv
+import fcntl
 import io
 import json
 import os
@@ -42,9 +44,17 @@ class Rows:
         self._columns = columns
         self._waiting: dict[int, Row] = {}
         self._next = 0
-        stated = json.dumps(identity, sort_keys=True, indent=1) + "\n"
+        stated = json.dumps(identity, sort_keys=True, indent=1, default=str) + "\n"
+        with contextlib.ExitStack() as kept:
+            self._begin(stated, kept, resume=resume)
+            self._kept = kept.pop_all()
+
+    def _begin(self, stated: str, kept: contextlib.ExitStack, *, resume: bool) -> None:
+        folder = self._folder
         try:
+            self._is_new = not folder.exists()
             folder.mkdir(parents=True, exist_ok=True)
+            kept.callback(os.close, _locked(folder))
             self._check(stated, resume=resume)
             known = self._known() if resume else {}
             write_file(folder / STATED, stated)
@@ -55,7 +65,8 @@ class Rows:
                     self._waiting[run] = row
             self._rewrite_journal()
         except (OSError, FileError) as error:
-            raise CampaignError(f"{folder}: cannot be written ({error})") from error
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+            raise CampaignError(f"{folder}: cannot be written ({reason})") from error
 
     @property
     def done(self) -> set[int]:
@@ -97,9 +108,17 @@ class Rows:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._csv.close()
-        if self._journal is not None:
-            self._journal.close()
+        for file in (self._csv, self._journal):
+            with contextlib.suppress(OSError):  # what a full disk did not take, ``add`` has reported
+                if file is not None:
+                    file.close()
+        if not self.done:  # nothing was flown: another try finds nothing in its way
+            for name in (CSV, STATED):
+                (self._folder / name).unlink(missing_ok=True)
+            if self._is_new:
+                with contextlib.suppress(OSError):  # somebody has put something there
+                    self._folder.rmdir()
+        self._kept.close()
 
     # -- what was there before ------------------------------------------------------------------------
 
@@ -113,15 +132,18 @@ class Rows:
             return
         if not resume:
             raise CampaignError(f"{self._folder} holds a campaign: --resume goes on with it")
-        if path.read_text(encoding="utf-8") != stated:
+        differ = _differences(path.read_text(encoding="utf-8", errors="replace"), json.loads(stated))
+        if differ:
             raise CampaignError(
-                f"{self._folder} holds another campaign: scenario, --seed or --sweep differ from {path}"
+                f"{self._folder} holds another campaign, by {STATED} in it: not the same {', '.join(differ)}"
             )
 
     def _known(self) -> dict[int, Row]:
         known = _rows_of(self._folder / CSV, self._columns)
         journal = self._folder / WAITING
-        for line in journal.read_text(encoding="utf-8").splitlines() if journal.exists() else ():
+        for line in (
+            journal.read_text(encoding="utf-8", errors="replace").splitlines() if journal.exists() else ()
+        ):
             try:
                 row = json.loads(line)
             except ValueError:
@@ -164,6 +186,36 @@ class Rows:
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerow(row[name] for name in self._columns)
         return text.getvalue()
+
+
+def _locked(folder: Path) -> int:
+    """Hold a folder for this process alone; what to close to give it back.
+
+    Raises:
+        CampaignError: Another process writes there.
+    """
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(held)
+        raise CampaignError(
+            f"{folder}: another process flies this campaign (one that was suspended goes on with 'fg')"
+        ) from error
+    except OSError:
+        return held  # a file system without locks
+    return held
+
+
+def _differences(text: str, stated: Mapping[str, object]) -> list[str]:
+    """What is not the same in two statements of what a campaign is of."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        return ["statement: it is damaged"]
+    return [name for name in stated if name not in found or found[name] != stated[name]]
 
 
 def _rows_of(path: Path, columns: tuple[str, ...]) -> dict[int, Row]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.campaign.errors import CampaignError
 from groundstation.campaign.plan import Plan
 from groundstation.campaign.running import Means, run_campaign
 from groundstation.cli.main import call
@@ -124,7 +125,7 @@ def cluster(tmp_path):
     with contextlib.ExitStack() as stack:
         file = tmp_path / "scheduler.json"
         options = ["--host", "tcp://127.0.0.1:0", "--no-dashboard", "--scheduler-file", str(file)]
-        stack.enter_context(
+        scheduler = stack.enter_context(
             ended(subprocess.Popen([*base, "distributed.cli.dask_scheduler", *options], **QUIET))
         )
         joined = ["--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard",
@@ -140,7 +141,7 @@ def cluster(tmp_path):
         with Client(scheduler_file=str(file), timeout=60, set_as_default=False) as client:
             client.wait_for_workers(2, timeout=60)
             address = client.scheduler.address
-        yield address, workers
+        yield address, workers, scheduler
 
 
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -157,7 +158,7 @@ def ended(process):
 
 @pytest.mark.slow
 def test_a_cluster_makes_the_same_rows_though_a_worker_is_killed(file, rows, tmp_path, cluster):
-    address, workers = cluster
+    address, workers, _ = cluster
     folder = tmp_path / "c"
 
     def kill_one(done, total):
@@ -167,6 +168,25 @@ def test_a_cluster_makes_the_same_rows_though_a_worker_is_killed(file, rows, tmp
 
     run_campaign(load(file), Plan(RUNS, SEED), folder, Means(1, address), kill_one, resume=False)
     assert (folder / "runs.csv").read_bytes() == rows
+
+
+@pytest.mark.slow
+def test_a_cluster_that_goes_away_is_one_sentence_and_what_it_flew_stays(
+    file, rows, tmp_path, cluster, capfd
+):
+    address, _, scheduler = cluster
+    folder = tmp_path / "c"
+
+    def kill_it(done, total):
+        del total
+        if done == 2:
+            scheduler.kill()
+
+    with pytest.raises(CampaignError, match="the cluster went away; --resume"):
+        run_campaign(load(file), Plan(RUNS, SEED), folder, Means(1, address), kill_it, resume=False)
+    assert "Traceback" not in capfd.readouterr().err
+    assert rows_in(folder) >= 2
+    assert flown(file, folder, Means(2), resume=True) == rows
 
 
 def test_a_cluster_that_is_not_there_is_one_sentence(file, tmp_path, capsys):
@@ -182,6 +202,32 @@ def test_a_cluster_that_is_not_there_is_one_sentence(file, tmp_path, capsys):
     ]
     assert call(words) == 2
     assert "no cluster answers there" in capsys.readouterr().err
+    assert not (tmp_path / "c").exists()
+
+
+def test_ctrl_c_while_workers_begin_is_one_sentence(file, tmp_path):
+    words = [sys.executable, "-m", "groundstation", "campaign", str(file), "--runs", "9", "--workers", "2"]
+    with subprocess.Popen(
+        [*words, "--out", str(tmp_path / "c")], stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        while run.poll() is None and not workers_of(run.pid):
+            os.sched_yield()
+        os.killpg(run.pid, signal.SIGINT)  # as a terminal does: the workers get it, too
+        assert run.stderr.read().splitlines() == [
+            f"groundstation: ended by hand; --resume goes on with what {tmp_path / 'c'} holds"
+        ]
+        assert run.wait(60) == 130
+
+
+def test_a_campaign_is_not_continued_on_another_rig(file, tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(RIG.read_text())
+    path = tmp_path / "scenario.toml"
+    path.write_text(file.read_text().replace(RIG.as_posix(), rig.name))
+    words = ["campaign", str(path), "--runs", "1", "--workers", "1", "--out", str(tmp_path / "c")]
+    assert call(words) == 0
+    rig.write_text(rig.read_text().replace("0.0003, -0.0001", "0.0004, -0.0001"))
+    assert call([*words, "--resume"]) == 2
 
 
 def test_a_run_that_raises_is_a_row_and_not_the_end(file, tmp_path):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import resource
 
 import pytest
 
@@ -115,3 +116,62 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(CampaignError, match="cannot be written"):
         opened(tmp_path / "file")
+
+
+def test_one_process_at_a_time_writes_the_rows(tmp_path):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0))
+        with pytest.raises(CampaignError, match="another process flies this campaign"):
+            opened(tmp_path, resume=True)
+        rows.add(1, row(1))
+    with opened(tmp_path, resume=True) as rows:
+        assert rows.done == {0, 1}
+
+
+@pytest.mark.parametrize("was_there", [True, False])
+def test_a_campaign_that_flew_nothing_leaves_nothing(tmp_path, was_there):
+    folder = tmp_path / "campaign"
+    if was_there:
+        folder.mkdir()
+    with opened(folder):
+        assert (folder / CSV).exists()
+    assert folder.exists() == was_there
+    assert not was_there or not any(folder.iterdir())
+
+
+def test_what_differs_from_the_campaign_that_is_there_is_named(tmp_path):
+    with opened(tmp_path, identity={"seed": 1, "rig": {"name": "a"}}) as rows:
+        rows.add(0, row(0))
+    with pytest.raises(CampaignError, match=r"not the same rig$"):
+        opened(tmp_path, resume=True, identity={"seed": 1, "rig": {"name": "b"}})
+    (tmp_path / STATED).write_bytes(b"\xff\xfe{")
+    with pytest.raises(CampaignError, match="damaged"):
+        opened(tmp_path, resume=True, identity={"seed": 1, "rig": {"name": "a"}})
+
+
+def test_a_journal_of_noise_is_flown_again(tmp_path):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0))
+        rows.add(2, row(2))
+    with (tmp_path / WAITING).open("ab") as journal:
+        journal.write(b"\xff\x00{\n")
+    with opened(tmp_path, resume=True) as rows:
+        assert rows.done == {0, 2}
+
+
+def test_a_disk_that_is_full_is_one_sentence_and_the_rows_before_it_stay(tmp_path):
+    def fill():
+        with opened(tmp_path) as rows:
+            for run in range(200):
+                rows.add(run, row(run, "because " * 4))
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(CampaignError, match="make room and go on with --resume"):
+            fill()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with opened(tmp_path, resume=True) as rows:
+        assert 50 < len(rows.done) < 200
+        assert [each["run"] for each in read(tmp_path)] == [str(run) for run in sorted(rows.done)]
