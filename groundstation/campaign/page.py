@@ -121,7 +121,7 @@ def _worst(scenario: Scenario, plan: Plan, rows: Sequence[Row], limits: Sequence
     sweep = ""
     if plan.sweep is not None:
         first, last = plan.sweep.values[0], plan.sweep.values[-1]
-        sweep = f" --sweep {shlex.quote(f'{plan.sweep.key}={first:g}:{last:g}:{len(plan.sweep.values)}')}"
+        sweep = f" --sweep {shlex.quote(f'{plan.sweep.key}={first!r}:{last!r}:{len(plan.sweep.values)}')}"
     asked = f"{shlex.quote(str(scenario.path))} --runs {plan.runs} --seed {plan.seed}{sweep}"
     command = f"groundstation campaign {asked} --out rerun --only"
     shown = [

@@ -21,6 +21,7 @@ from groundstation.scenario.quantities import QUANTITIES
 HEAD = ("run", "seed", "verdict", "reason")
 LIMITS = "limits."
 MOST_RUNS = 1_000_000
+LARGEST = 1e300
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,7 @@ def parse_sweep(text: str) -> Sweep:
     parts = span.split(":")
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or not key or not 1 <= count <= MOST_RUNS or not np.isfinite([low, high]).all():
+        if len(parts) != 3 or not key or not 1 <= count <= MOST_RUNS or not abs(low) + abs(high) < LARGEST:
             raise ValueError
     except (ValueError, IndexError):
         raise CampaignError(

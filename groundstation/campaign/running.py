@@ -17,8 +17,9 @@ from groundstation.campaign.plan import Plan, columns_of, identity
 from groundstation.campaign.rows import CSV, Rows
 from groundstation.files.writing import write_file
 from groundstation.recording.software import software
+from groundstation.scenario.dispersions import SEED
 from groundstation.scenario.loading import Scenario
-from groundstation.scenario.rehearsal import check_dispersions, check_failures
+from groundstation.scenario.rehearsal import check_dispersions, check_extremes, check_failures
 
 Progress = Callable[[int, int], None]
 REPORT = "report.html"
@@ -41,10 +42,13 @@ def check(scenario: Scenario, plan: Plan) -> None:
     """What can be known before anything flies.
 
     Raises:
-        UsageError: Rig or laboratory refuse what is drawn, or the first and last values of a sweep.
+        UsageError: Rig or laboratory refuse what may be drawn, or the first and last values of a sweep.
     """
     check_failures(scenario)
     check_dispersions(scenario)
+    check_extremes(scenario)
+    if plan.sweep is not None and plan.sweep.key == SEED:
+        raise CampaignError(f"--sweep {SEED}: each run has a seed of its own, drawn from --seed")
     for run in {0, plan.count - 1} if plan.sweep is not None else ():
         check_failures(scenario.vary(plan.changes(scenario, run)))
 

@@ -49,8 +49,10 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
     """
     if asked.lockstep and asked.hardware is not None:
         raise UsageError("--hardware runs in real time, --lockstep in virtual time: give one of them")
-    if asked.i_know is not None and not asked.i_know.strip():
-        raise UsageError("--i-know needs a reason in words: it is recorded")
+    if asked.i_know is not None and asked.hardware is None:
+        raise UsageError("--i-know goes with --hardware: only there a dry run can refuse")
+    if asked.i_know is not None and not (asked.i_know.strip() and asked.i_know.isprintable()):
+        raise UsageError("--i-know needs a reason in words, on one line: it is recorded")
     if asked.record is not None:
         check_new_recording(asked.record)
     if asked.report is not None:

@@ -58,6 +58,8 @@ def read_text(path: Path, what: str = "rig file") -> str:
         raise RigError(f"{path}: there is no such {what}") from error
     except OSError as error:
         raise RigError(f"{path}: cannot be read as a {what} ({error.strerror})") from error
+    except ValueError as error:  # a NUL in the name
+        raise RigError(f"{str(path)!r}: cannot be read as a {what} ({error})") from error
     except FileError as error:
         raise RigError(str(error)) from error
 

@@ -17,6 +17,8 @@ from groundstation.scenario.scenario_file import Dispersion, ScenarioError
 Drawn = float | int | str | bool
 LAST_SEED = 2**31
 ANY = "*"
+SEED = "laboratory.seed"
+"""Of each run: no key to draw or sweep."""
 
 
 def draw(scenario: Scenario, seed: int, run: int) -> dict[str, Drawn]:
@@ -42,13 +44,46 @@ def expanded_keys(scenario: Scenario) -> list[tuple[str, Dispersion]]:
     """Keys without ``*``, each with its law, in the order of the file.
 
     Raises:
-        ScenarioError: ``*`` stands where nothing can be listed.
+        ScenarioError: ``*`` stands where nothing can be listed; or one value has two laws.
     """
-    return [
-        (key, row)
-        for pattern, row in scenario.file.dispersions.items()
-        for key in _expanded(scenario, pattern)
-    ]
+    found: dict[str, tuple[str, Dispersion]] = {}
+    common: dict[str, Dispersion] = {}
+    for pattern, row in scenario.file.dispersions.items():
+        where = f"{scenario.path}: dispersions.{pattern}"
+        other = common.setdefault(row.common or pattern, row)
+        if _kind(other) != _kind(row):
+            raise ScenarioError(
+                f"{where}: common = {row.common!r} draws one value, which cannot be both {other.law!r} and "
+                f"{row.law!r}"
+            )
+        for key in _expanded(scenario, pattern):
+            if key == SEED:
+                raise ScenarioError(
+                    f"{where}: each run has a seed of its own, drawn from that of the campaign"
+                )
+            if key in found:
+                raise ScenarioError(f"{where}: {key} is drawn by {found[key][0]!r} already")
+            found[key] = pattern, row
+    return [(key, row) for key, (_, row) in found.items()]
+
+
+def _kind(row: Dispersion) -> tuple[str, int]:
+    """Laws of one kind make like values of one draw."""
+    return row.law.removeprefix("add_"), len(row.choice or ())
+
+
+def extremes(scenario: Scenario) -> Iterator[tuple[str, dict[str, Drawn]]]:
+    """What a campaign may draw at worst: every choice, and both ends of what is uniform.
+
+    Yields:
+        Key as the file has it, and values by expanded key.
+    """
+    for pattern, row in scenario.file.dispersions.items():
+        keys = tuple(_expanded(scenario, pattern))
+        for value in row.choice or row.uniform or ():
+            yield pattern, dict.fromkeys(keys, value)
+        for value in row.add_uniform or ():
+            yield pattern, {key: _nominal(scenario, key) + value for key in keys}
 
 
 def _expanded(scenario: Scenario, pattern: str) -> Iterator[str]:

@@ -18,14 +18,21 @@ from groundstation.rig.variation import varied
 from groundstation.scenario.compiling import compiled_rig, groups_of
 from groundstation.scenario.key_trouble import KeyTroubleError
 from groundstation.scenario.limits import check_limits
-from groundstation.scenario.scenario_file import WHAT, ScenarioError, ScenarioFile, content_of, parse_content
+from groundstation.scenario.scenario_file import (
+    WHAT,
+    ScenarioError,
+    ScenarioFile,
+    content_of,
+    is_scenario,
+    parse_content,
+)
 
 OF_VEHICLE = ("start", "control", "laboratory", "may_land")
 """Keys of a vehicle that are the scenario's; all others are the rig's."""
 OF_SCENARIO = ("timeline", "obstacles", "duration_s", "ready_s")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scenario:
     """An experiment.
 
@@ -42,6 +49,9 @@ class Scenario:
     file: ScenarioFile
     base: Rig
     rig: Rig
+
+    def __repr__(self) -> str:
+        return f"<scenario {self.name!r} of {self.path}>"
 
     @property
     def name(self) -> str:
@@ -100,7 +110,10 @@ def load(path: Path | str) -> Scenario:
         UsageError: One sentence with file and key.
     """
     path = Path(path)
-    return made(content_of(read_text(path, WHAT), path), path)
+    content = content_of(read_text(path, WHAT), path)
+    if not is_scenario(content) and "mock_ups" in content:
+        raise ScenarioError(f"{path}: is a rig; a scenario file names the rig that it flies: rig = ...")
+    return made(content, path)
 
 
 def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenario:

@@ -19,6 +19,7 @@ from groundstation.scenario.judging import Judged
 from groundstation.scenario.loading import Scenario
 from groundstation.scenario.rehearsal import check_failures
 from groundstation.scenario.running import fly, seed_for
+from groundstation.scenario.scenario_file import ScenarioError
 from groundstation.watch.verdict import PASSED, LimitOutcome, RunEvent
 
 Law = Callable[[ControlState, Goal, float], tuple[float, float, float]]
@@ -58,7 +59,7 @@ class FunctionLaw:
         return BodyWrench((force_x_n, force_y_n), torque_nm)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flown:
     """A run in virtual time, judged.
 
@@ -67,6 +68,10 @@ class Flown:
     """
 
     judged: Judged
+
+    def __repr__(self) -> str:
+        verdict = self.judged.verdict
+        return f"<{verdict.title}: {verdict.verdict}{f', {verdict.reason}' if verdict.reason else ''}>"
 
     @property
     def passed(self) -> bool:
@@ -89,7 +94,14 @@ class Flown:
         return self.judged.verdict.events
 
     def __getitem__(self, quantity: str) -> float:
-        """A quantity over the whole run: ``flown["alpha.gas_ns"]``, ``["alpha-beta.least_distance_mm"]``."""
+        """A quantity over the whole run: ``flown["alpha.gas_ns"]``, ``["alpha-beta.least_distance_mm"]``.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        if quantity not in self.judged.values:
+            known = ", ".join(self.judged.values) or f"nothing was flown: {self.reason}"
+            raise KeyError(f"no quantity is called {quantity!r} ({known})")
         return self.judged.values[quantity].value
 
     @property
@@ -102,6 +114,7 @@ class Flown:
 
         Raises:
             ValueError: t = 0 never came, so nothing was flown.
+            KeyError: There is no such vehicle.
         """
         return self._tracks(vehicle).truth.T
 
@@ -122,7 +135,10 @@ class Flown:
     def _tracks(self, vehicle: str) -> VehicleTrack:
         if self.judged.flown is None:
             raise ValueError(f"nothing was flown: {self.reason}")
-        return self.judged.flown.tracks[vehicle]
+        tracks = self.judged.flown.tracks
+        if vehicle not in tracks:
+            raise KeyError(f"there is no vehicle {vehicle!r} (there are: {', '.join(tracks)})")
+        return tracks[vehicle]
 
 
 def run(
@@ -138,8 +154,14 @@ def run(
         laws: By vehicle, a function or a controller in the place of the scenario's.
 
     Raises:
-        UsageError: The laboratory refuses what the scenario asks.
+        UsageError: The laboratory refuses what the scenario asks, or a law is for no vehicle of the rig.
     """
+    for name in laws:
+        if name not in scenario.rig.vehicles:
+            raise ScenarioError(
+                f"{scenario.path}: laws: the rig has no vehicle {name!r} (it has: "
+                f"{', '.join(scenario.rig.vehicles)})"
+            )
     check_failures(scenario)
     own = {name: FunctionLaw(law) if callable(law) else law for name, law in laws.items()}
     return Flown(fly(scenario, seed_for(scenario, seed), laws=own))

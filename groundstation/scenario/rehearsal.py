@@ -16,7 +16,7 @@ from groundstation.parts.scenario.sections import ScenarioOfRig
 from groundstation.rig.provenance import file_hashes
 from groundstation.rig.read import load_rig
 from groundstation.runners.make_runner import open_laboratory
-from groundstation.scenario.dispersions import draw, laboratory_seed
+from groundstation.scenario.dispersions import draw, extremes, laboratory_seed
 from groundstation.scenario.judging import Judged
 from groundstation.scenario.loading import Scenario
 from groundstation.scenario.quantities import QUANTITIES
@@ -76,6 +76,21 @@ def check_dispersions(scenario: Scenario) -> None:
                 reason = str(error).removeprefix(f"{scenario.path}: ")
                 raise ScenarioError(f"{scenario.path}: dispersions.{key}: {reason}") from error
         raise
+
+
+def check_extremes(scenario: Scenario) -> None:
+    """Try every choice and both ends of what is uniform, one key at a time.
+
+    Raises:
+        ScenarioError: Rig or laboratory refuse one; the sentence names key and value.
+    """
+    for pattern, changes in extremes(scenario):
+        try:
+            check_failures(scenario.vary(changes))
+        except UsageError as error:
+            reason = str(error).removeprefix(f"{scenario.path}: ")
+            value = next(iter(changes.values()))
+            raise ScenarioError(f"{scenario.path}: dispersions.{pattern}: {value!r}: {reason}") from error
 
 
 def twin_of(rig: Rig) -> Rig:

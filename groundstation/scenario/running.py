@@ -43,7 +43,7 @@ def seed_for(scenario: Scenario, seed: int | None) -> int:
     if seed is None:
         seed = scenario.file.seed
     try:
-        return seed_of(scenario.base, seed)
+        return seed_of(scenario.rig, seed)
     except RigError as error:
         raise ScenarioError(f"{scenario.path}: {error}") from error
 

@@ -7,7 +7,7 @@ TOML, metres, seconds, degrees; every key names its unit.
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from groundstation.declarations.calls import in_one_line, shortened
 from groundstation.declarations.errors import UsageError
@@ -25,6 +25,17 @@ ALL, FOLLOWERS = "all", "followers"
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Span = Annotated[float, Field(gt=0.0, le=86400.0)]
 Name = Annotated[str, Field(pattern=f"^{PATTERN}$")]
+
+
+def _is_plain(text: str) -> str:
+    """Refuse what would move a terminal's cursor or break a report."""
+    if not text.strip() or not text.isprintable():
+        raise ValueError(f"expected words on one line, without control characters, found {shortened(text)!r}")
+    return text
+
+
+Words = Annotated[str, Field(max_length=200), AfterValidator(_is_plain)]
+"""What stands in terminals, recordings and reports."""
 
 
 class ScenarioError(UsageError):
@@ -76,7 +87,7 @@ class Row(Section):
     failure: str | None = None
     parameters: dict[str, float] = Field(default_factory=dict)
     for_s: Span | None = None
-    mark: str | None = None
+    mark: Words | None = None
 
     @model_validator(mode="after")
     def _is_one_thing(self) -> Self:
@@ -174,7 +185,7 @@ class ScenarioFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    name: Annotated[str, Field(min_length=1, max_length=200)]
+    name: Words
     rig: str
     duration_s: Span
     ready_s: Span = 60.0

@@ -44,6 +44,8 @@ def timeline_rows(file: ScenarioFile, rig: Rig, groups: Groups) -> Iterator[Chan
             made |= {"when": plain(condition), "timeout_s": row.timeout_s, "after_s": row.after_s}
         if row.mark is not None:
             made["mark"] = row.mark
+            if row.vehicle is not None:
+                members(f"{key}.vehicle", row.vehicle, groups)
         else:
             assert row.vehicle is not None
             vehicles = members(f"{key}.vehicle", row.vehicle, groups)
@@ -103,10 +105,11 @@ def _arguments(action: Action, row: Row, key: str) -> dict[str, Any]:
     }
     given: dict[str, Any] = {}
     for name, value in row.arguments.items():
+        if name in in_file.values():
+            raise KeyTroubleError(f"{key}.arguments: {name!r} is in degrees here: {name[:-4]}_deg")
         if name in in_file and isinstance(value, int | float) and not isinstance(value, bool):
-            given[in_file[name]] = math.radians(value)
-        else:
-            given[name] = value
+            value = math.radians(value)
+        given[in_file.get(name, name)] = value
     try:
         return dict(action.check(given))
     except ArgumentError as error:

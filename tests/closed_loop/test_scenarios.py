@@ -82,7 +82,8 @@ def test_a_scenario_whose_limits_hold_ends_with_0_and_a_wrong_file_with_2(file, 
 
 
 @pytest.mark.parametrize("words", [["--duration", "5"], ["--hardware", "x.toml", "--lockstep"],
-                                   ["--hardware", str(RIG), "--i-know", " "]])  # fmt: skip
+                                   ["--hardware", str(RIG), "--i-know", " "],
+                                   ["--lockstep", "--i-know", "why"]])  # fmt: skip
 def test_options_that_do_not_go_together_are_refused(file, words, capsys):
     assert call(["run", str(file(SHORT)), *words]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -175,6 +176,31 @@ def hardware(tmp_path, twin):
     path = tmp_path / "hardware.toml"
     path.write_text(text if twin is None else f'twin = "{twin}"\n{text}')
     return path
+
+
+def test_a_notebooks_mistakes_are_named(file):
+    plan = scenario.load(file(SHORT)).vary({"duration_s": 0.5})
+    with pytest.raises(UsageError, match="no vehicle 'gamma'"):
+        scenario.run(plan, laws={"gamma": lambda state, goal, dt_s: (0.0, 0.0, 0.0)})
+    flown = scenario.run(plan)
+    assert repr(flown) == "<short: passed>"
+    with pytest.raises(KeyError, match=r"'alpha.gas' .*alpha\.gas_ns"):
+        flown["alpha.gas"]
+    with pytest.raises(KeyError, match=r"no vehicle 'gamma' .*alpha, beta"):
+        flown.truth("gamma")
+    grounded = scenario.run(plan.vary({"ready_s": 0.01}))
+    with pytest.raises(KeyError, match="nothing was flown: ready_s"):
+        grounded["alpha.gas_ns"]
+
+
+def test_limits_of_groups_and_pairs_are_judged_for_each(file):
+    limits = (
+        '[[limits]]\nwhat = "gas_ns"\nvehicles = ["alpha", "beta"]\nbelow = 1000.0\n'
+        '[[limits]]\nwhat = "least_distance_mm"\nvehicle = "all"\nabove = 10.0\n'
+    )
+    flown = scenario.run(scenario.load(file(SHORT + limits)).vary({"duration_s": 0.5}))
+    assert flown.passed
+    assert [limit.vehicles for limit in flown.limits] == [("alpha",), ("beta",), ("alpha", "beta")]
 
 
 def test_hardware_without_a_twin_is_refused(file, tmp_path):

@@ -2,9 +2,10 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from groundstation.parts.scenario.conditions import FLAGS, MEASURES, Bounds, Condition, Term
+from groundstation.declarations.calls import shortened
+from groundstation.parts.scenario.conditions import FLAGS, MEASURES, SETTLED, Bounds, Condition, Term
 
 _TERM = re.compile(r"^\s*(?:(\w+)\.(\w+)|(\w+)\(([\w\s,]*)\)\s*(<=|>=|<|>)\s*([-+.\dEeinfa]+))\s*$")
 
@@ -38,14 +39,34 @@ def read_condition(text: str, groups: Mapping[str, tuple[str, ...]], bounds: Bou
     terms: list[Term] = []
     for part in re.split(r"\band\b", text):
         terms += _terms(part, groups, bounds)
+    _check_together(terms)
     return Condition(text, tuple(terms))
+
+
+def _check_together(terms: Iterable[Term]) -> None:
+    """Refuse terms that exclude each other: a vehicle has one mode, a number one value."""
+    modes: dict[str, str] = {}
+    spans: dict[tuple[str, frozenset[str]], tuple[float, float]] = {}
+    for term in terms:
+        of = term.vehicles[0]
+        if term.measure:
+            key = term.measure, frozenset(term.vehicles)
+            low, high = spans.get(key, (-math.inf, math.inf))
+            low, high = (low, min(high, term.bound)) if term.is_below else (max(low, term.bound), high)
+            if low >= high:
+                raise ConditionError(
+                    f"{term.measure}({', '.join(term.vehicles)}) cannot be above {low:g} and below {high:g}"
+                )
+            spans[key] = low, high
+        elif term.flag != SETTLED and modes.setdefault(of, term.flag) != term.flag:
+            raise ConditionError(f"{of} cannot be {modes[of]} and {term.flag} at the same time")
 
 
 def _terms(text: str, groups: Mapping[str, tuple[str, ...]], bounds: Bounds) -> list[Term]:
     found = _TERM.match(text)
     if found is None:
         raise ConditionError(
-            f"{text.strip()!r} is no condition: expected for example 'alpha.settled' or "
+            f"{shortened(text.strip())!r} is no condition: expected for example 'alpha.settled' or "
             f"'distance_mm(alpha,beta) < 400'; numbers: {', '.join(MEASURES)}; flags: {', '.join(FLAGS)}"
         )
     name, flag, measure, listed, sign, number = found.groups()

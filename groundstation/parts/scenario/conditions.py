@@ -20,6 +20,8 @@ SETTLED_FOR_NS = 3_000_000_000
 STALE_NS = 1_000_000_000
 """What is older is not known."""
 SETTLED = "settled"
+FASTEST_MM_S = 1e5
+"""No speed of a rig is above (``drivers.files.amounts``)."""
 
 
 @dataclass(slots=True)
@@ -86,6 +88,11 @@ class Bounds:
         return min(x - self.x_m[0], self.x_m[1] - x, y - self.y_m[0], self.y_m[1] - y) - MOCK_UP_RADIUS_M
 
     @property
+    def middle_m(self) -> Vector2:
+        """The place farthest from all edges."""
+        return (self.x_m[0] + self.x_m[1]) / 2, (self.y_m[0] + self.y_m[1]) / 2
+
+    @property
     def diagonal_m(self) -> float:
         """The longest way on the table."""
         return math.hypot(self.x_m[1] - self.x_m[0], self.y_m[1] - self.y_m[0])
@@ -116,19 +123,21 @@ class Measure:
 
 
 MEASURES: Mapping[str, Measure] = {
-    "distance_mm": Measure("between two hulls", 2, _distance_mm, lambda bounds: 1e3 * bounds.diagonal_m),
+    "distance_mm": Measure(
+        "between two hulls", 2, _distance_mm, lambda bounds: 1e3 * (bounds.diagonal_m - 2 * MOCK_UP_RADIUS_M)
+    ),
     "edge_mm": Measure(
         "from the hull to the table's edge",
         1,
         lambda bounds, one: 1e3 * bounds.edge_m(one.position_table_m),
-        lambda bounds: 500.0 * bounds.diagonal_m,
+        lambda bounds: 1e3 * bounds.edge_m(bounds.middle_m),
         -math.inf,
     ),
     "speed_mm_s": Measure(
         "of the centre of mass",
         1,
         lambda bounds, one: 1e3 * math.hypot(*one.velocity_table_m_s),
-        lambda bounds: math.inf,
+        lambda bounds: FASTEST_MM_S,
     ),
     "position_error_mm": Measure(
         "to the controller's setpoint",

@@ -1,12 +1,13 @@
 """Whatever is wrong with a scenario file is one sentence with file and key, before anything moves."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from groundstation.declarations.errors import UsageError
 from groundstation.scenario.loading import load
-from groundstation.scenario.rehearsal import check_dispersions, check_failures
+from groundstation.scenario.rehearsal import check_dispersions, check_extremes, check_failures
 
 RIG = Path(__file__).parents[4] / "examples/rigs/two_mock_ups_drawn.toml"
 GOOD = f"""
@@ -114,6 +115,40 @@ MISTAKES = {
     "limit of one that needs two": ('["alpha", "beta"]', '["alpha"]', ["limits.0", "two vehicles"]),
     "limit over no span": ("from_s = 40.0", "from_s = 40.0\nto_s = 30.0", ["limits.1", "from_s"]),
     "limit behind the end": ("from_s = 40.0", "from_s = 70.0", ["limits.1", "duration_s"]),
+    "rig of an impossible name": (RIG.as_posix(), "a\\u0000b", ["cannot be read"]),
+    "nothing marked": ('mark = "there"', 'mark = " "', ["timeline.2.mark", "words"]),
+    "mark that moves the cursor": ('mark = "there"', 'mark = "\\u001b[2J"', ["timeline.2.mark", "control"]),
+    "mark without an end": ('mark = "there"', f'mark = "{"x" * 5000}"', ["timeline.2.mark", "200"]),
+    "name of two lines": ('name = "test"', 'name = "a\\nb"', ["name", "one line"]),
+    "mark of nobody": ('mark = "there"', 'mark = "there"\nvehicle = "gamma"',
+                              ["timeline.2.vehicle", "gamma"]),
+    "heading that is a text": ("heading_deg = 90.0", 'heading_deg = "east"',
+                               ["timeline.0.arguments", "heading_deg", "a number"]),
+    "heading in radians": ("heading_deg = 90.0", "heading_rad = 1.5",
+                              ["timeline.0.arguments", "heading_deg"]),
+    "wait for two modes": ('"beta.settled"', '"beta.flying and beta.landed"',
+                              ["timeline.2.when", "same time"]),
+    "wait for two distances": (
+        '"beta.settled"', '"distance_mm(alpha,beta) < 100 and distance_mm(beta,alpha) > 200"',
+        ["timeline.2.when", "above 200 and below 100"],
+    ),
+    "wait for more room than there is": ('"beta.settled"', '"edge_mm(beta) > 1400"',
+                              ["timeline.2.when", "never"]),
+    "wait for a speed that nothing has": ('"beta.settled"', '"speed_mm_s(beta) > 1e9"',
+                              ["timeline.2.when", "never"]),
+    "dispersion that is drawn twice": (
+        "{ normal = [11.0, 0.2] }",
+        '{ normal = [11.0, 0.2] }\n"laboratory.*.mass_kg" = { uniform = [10.0, 12.0] }',
+        ["dispersions.laboratory.*.mass_kg", "already"],
+    ),
+    "one value of two laws": (
+        "{ normal = [11.0, 0.2] }",
+        '{ normal = [11.0, 0.2], common = "m" }\n'
+        '"laboratory.beta.mass_kg" = { uniform = [10.0, 12.0], common = "m" }',
+        ["dispersions.laboratory.beta.mass_kg", "common"],
+    ),
+    "dispersion of the seed": ('"laboratory.alpha.mass_kg"', '"laboratory.seed"',
+                              ["dispersions.laboratory.seed"]),
     "limit of no vehicles": ('["alpha", "beta"]', "[]", ["limits.0.vehicles"]),
     "limit of a pair of one": ('vehicles = ["alpha", "beta"]', 'vehicle = "followers"',
                                ["limits.0", "two vehicles", "beta"]),
@@ -160,6 +195,23 @@ def test_a_mistake_is_one_sentence_with_file_and_key(mistake: str, tmp_path: Pat
         assert word in sentence, sentence
     assert "wrong.toml" in sentence, sentence
     assert "\n" not in sentence
+
+
+@pytest.mark.parametrize(
+    ("law", "value"),
+    [("{ choice = [11.0, 11.5, -1.0] }", "-1.0"), ('{ choice = [11.0, "heavy"] }', "'heavy'"),
+     ("{ uniform = [-0.001, 1000.0] }", "-0.001")],
+)  # fmt: skip
+def test_what_a_campaign_may_draw_is_tried_before_it_flies(law, value, tmp_path):
+    path = tmp_path / "scenario.toml"
+    path.write_text(GOOD.replace("{ normal = [11.0, 0.2] }", law))
+    with pytest.raises(UsageError, match=re.escape(f"dispersions.laboratory.alpha.mass_kg: {value}: ")):
+        check_extremes(load(path))
+
+
+def test_a_rig_is_no_scenario():
+    with pytest.raises(UsageError, match="is a rig; a scenario file names"):
+        load(RIG)
 
 
 def test_a_goal_off_the_table_may_be_expected_to_be_refused(tmp_path: Path) -> None:
