@@ -97,8 +97,8 @@ def twin_of(rig: Rig) -> Rig:
     """The emulated twin that a hardware rig names.
 
     Raises:
-        RigError: It names none, or one that is no twin: without a laboratory, with other vehicles or with
-            other calibration files.
+        RigError: It names none, or one that is no twin: without a laboratory, with other vehicles, with
+            another table or other calibration files.
     """
     named = rig.section(ScenarioOfRig).twin
     if named is None:
@@ -110,6 +110,8 @@ def twin_of(rig: Rig) -> Rig:
         raise RigError(f"twin: {named.path} has no [laboratory]")
     if set(twin.vehicles) != set(rig.vehicles):
         raise RigError(f"twin: {named.path} has other vehicles: {', '.join(twin.vehicles)}")
+    if twin.table != rig.table:
+        raise RigError(f"twin: [table] of {named.path} is not that of the rig: its edges would be elsewhere")
     theirs = file_hashes(twin)
     for key, sha256 in file_hashes(rig).items():
         if key != "twin" and theirs.get(key, sha256) != sha256:

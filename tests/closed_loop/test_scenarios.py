@@ -240,3 +240,8 @@ def test_a_twin_with_other_calibration_or_vehicles_is_none(file, tmp_path):
     other = EXAMPLES / "rigs" / "drawn_fixes.toml"
     with pytest.raises(UsageError, match="has other vehicles"):
         rehearse(plan, load_rig(hardware(tmp_path, other.as_posix())))
+    larger = tmp_path / "larger.toml"
+    text = RIG.read_text()
+    larger.write_text(text.replace("x_max_m = 2.0", "x_max_m = 3.0").replace("[-2.0, 2.0", "[-2.0, 3.0"))
+    with pytest.raises(UsageError, match=r"\[table\] of .*larger\.toml is not that of the rig"):
+        rehearse(plan, load_rig(hardware(tmp_path, larger.as_posix())))
