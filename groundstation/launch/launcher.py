@@ -257,11 +257,8 @@ class Launcher:
         for name in sorted(self._waiting):
             child = self._children[name]
             child.started_s = self._time.now_s
-            child.write(
-                pickle.dumps(
-                    Go({**self._addresses, f"{STATION_CHANNEL}memory": self._memory.address(child.restarts)})
-                )
-            )
+            memory = self._memory.address(has_kept=child.restarts > 0 and child.has_been_ready)
+            child.write(pickle.dumps(Go({**self._addresses, f"{STATION_CHANNEL}memory": memory})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
