@@ -169,6 +169,6 @@ def note_of_rest(screened_s: Array, run_start_s: float, name: str) -> tuple[str,
     if not len(before) or not len(after) or after[0] - before[-1] <= LONG_GAP_S:
         return ()
     return (
-        f"{name}: {after[0] - before[-1]:.6g} s are missing where known.run_start_s = {run_start_s:g} ends the "
-        f"rest: the {len(after)} packets behind do not count as one",
+        f"{name}: {after[0] - before[-1]:.6g} s are missing where known.run_start_s = {run_start_s:g} ends "
+        f"the rest: the {len(after)} packets behind do not count as one",
     )

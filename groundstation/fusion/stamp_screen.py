@@ -1,10 +1,10 @@
 """Which stamps of a recorded table are believed: the one judgement for files and recordings.
 
 One wild stamp is an outlier, not a fact. Of a clock that runs on, the most rows that rise together are kept,
-so that neither a stamp far ahead nor one behind takes its neighbours with it; nor does a stretch of them, from
-which the clock comes back to where it would have been. A stamp after a long gap counts when others go on
-from it. Many rows in a row that lie behind are a clock that was set back: a new epoch
-whose seconds are counted on from the one before.
+so that neither a stamp far ahead nor one behind takes its neighbours with it; nor does a stretch of them,
+from which the clock comes back to where it would have been. A stamp after a long gap counts when others go
+on from it. Many rows in a row that lie behind are a clock that was set back: a new epoch whose seconds are
+counted on from the one before.
 """
 
 from __future__ import annotations

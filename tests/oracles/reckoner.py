@@ -33,8 +33,8 @@ class OracleReckoner:
         "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
         "_mxx", "_mxy", "_myx", "_myy", "_period", "_px", "_py", "_rate_read", "_reference_c",
         "_rx", "_ry", "_screen", "_slope_x", "_slope_y", "_temperature_c", "_theta", "_until_lookup",
-        "_vx", "_vy", "_warmed_s", "_warmth", "_x", "checkpoint_s", "crossed_s", "has_pose", "history", "is_lost",
-        "newest_ns", "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
+        "_vx", "_vy", "_warmed_s", "_warmth", "_x", "checkpoint_s", "crossed_s", "has_pose", "history",
+        "is_lost", "newest_ns", "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
