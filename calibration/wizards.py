@@ -7,7 +7,6 @@ same wizard, and a lockstep runner takes the same node.
 
 from __future__ import annotations
 
-import getpass
 import hashlib
 import itertools
 import json
@@ -30,6 +29,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request, Value
 from groundstation.declarations.rig import Rig
+from groundstation.launch.asking import user_name
 from groundstation.launch.beside import run_beside
 from groundstation.launch.running import find_running
 from groundstation.rig.read import load_rig
@@ -201,7 +201,7 @@ def lead(name: str, rig_path: Path, vehicle: str | None, out: Path, *, is_driven
             f"no run with a vehicle {chosen!r} is going on: start it with `groundstation run {rig_path}`."
         )
     guide = wizard.begin(rig, chosen)
-    node = GuideNode(chosen, guide, _print_advice, getpass.getuser() if is_driven else "")
+    node = GuideNode(chosen, guide, _print_advice, user_name() if is_driven else "")
     try:
         run_beside(rig, run.endpoint, "guided_calibration", node, lambda: node.is_done)
     except (zenoh.ZError, HubError) as error:

@@ -228,6 +228,14 @@ class ZenohBus:
         self._subscribers.append(subscriber)
         return Mailbox(subscriber.handler)
 
+    def keep_wanted(self, key_expression: str) -> None:
+        """Let publishers always find a subscriber under a key expression, and send to the hub.
+
+        They are told of a subscriber that comes while they run some milliseconds later: too late for the
+        answer to a request that follows at once. The hub itself knows the subscriber before the request.
+        """
+        self.collect(key_expression, 1)
+
     def announce(self, process: str) -> None:
         """Tell the others that this process is ready; withdrawn when the process ends, however it ends."""
         self._token = self._session.liveliness().declare_token(f"{ALIVE}/{process}")

@@ -1,14 +1,13 @@
 """``groundstation inject``: let the emulated laboratory of a running rig inject a failure."""
 
-import getpass
 import json
 from typing import Annotated
 
 import typer
 
 from groundstation.declarations.errors import UsageError
-from groundstation.declarations.request import ArgumentError
-from groundstation.launch.asking import ask
+from groundstation.declarations.request import ArgumentError, checked_name
+from groundstation.launch.asking import ask, user_name
 from groundstation.launch.running import choose_run
 from groundstation.parts.table import installed_tables
 
@@ -37,10 +36,11 @@ def inject(
     parameters = json.dumps(_parameters(list(context.args)))
     try:
         given = action.check({"failure": failure, "for_s": for_s, "parameters": parameters})
+        author = checked_name(name or user_name())
     except ArgumentError as error:
         raise UsageError(str(error)) from error
     run = choose_run(vehicle, pid)
-    ack = ask(run.endpoint, vehicle, action.name, given, name or getpass.getuser(), timeout)
+    ack = ask(run.endpoint, vehicle, action.name, given, author, timeout)
     verdict = "accepted" if ack.accepted else f"refused: {ack.reason}"
     print(f"{vehicle} ({run.rig}): inject {failure} for {for_s:g} s: {verdict}")
     if not ack.accepted:
@@ -54,9 +54,11 @@ def _parameters(words: list[str]) -> dict[str, float]:
         name = words.pop(0)
         if not name.startswith("--") or not words:
             raise UsageError(f"expected --parameter value, found {name!r}")
-        word = words.pop(0)
+        word, parameter = words.pop(0), name.removeprefix("--").replace("-", "_")
+        if parameter in found:
+            raise UsageError(f"{name} is given twice")
         try:
-            found[name.removeprefix("--").replace("-", "_")] = float(word)
+            found[parameter] = float(word)
         except ValueError:
             raise UsageError(f"{name} is {word!r}, expected a number") from None
     return found

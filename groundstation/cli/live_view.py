@@ -1,6 +1,5 @@
 """A live run on a terminal: a view or lines, until it is over or somebody asks for the end."""
 
-import getpass
 import signal
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from rich.console import Console
 
 from groundstation.cli.keys import HELP, Keys, stdin_descriptor
 from groundstation.cli.terminal_view import TerminalView
+from groundstation.launch.asking import user_name
 from groundstation.launch.live_run import LiveRun
 
 REFRESH_S = 0.25
@@ -50,7 +50,7 @@ def run_live(
             stdin_descriptor(),
             live.launcher.endpoint,
             tuple(live.rig.vehicles),
-            getpass.getuser(),
+            user_name(),
             live.monitor.note,
             ending.ask,
         )

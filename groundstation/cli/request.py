@@ -1,6 +1,5 @@
 """``groundstation request``: ask something of a running vehicle, or of all."""
 
-import getpass
 import math
 import sys
 from collections.abc import Mapping
@@ -12,8 +11,17 @@ import typer
 from typer.core import TyperCommand
 
 from groundstation.declarations.errors import GroundStationError, UsageError
-from groundstation.declarations.request import Ack, Action, Argument, ArgumentError, Value
-from groundstation.launch.asking import ask_each, silence
+from groundstation.declarations.lease import FREE_FOR_ALL
+from groundstation.declarations.request import (
+    Ack,
+    Action,
+    Argument,
+    ArgumentError,
+    Value,
+    checked_name,
+    shown_name,
+)
+from groundstation.launch.asking import ask_each, silence, user_name
 from groundstation.launch.running import RunningRig, choose_run, choose_runs
 from groundstation.launch.stop_button import EVERY, press_stop
 from groundstation.parts.supervision.actions import ACTIONS
@@ -94,8 +102,8 @@ def request(
         raise UsageError(str(error)) from error
     if vehicle == ALL and action not in (*FOR_ALL, *OF_RIG):
         raise UsageError(f"{action} is asked of one vehicle; all can be asked to {', '.join(FOR_ALL)}")
+    author = _author(name or user_name(), action)
     runs = choose_runs(pid) if vehicle == ALL else [choose_run(vehicle, pid)]
-    author = name or getpass.getuser()
 
     def work(run: RunningRig) -> list[_Answer]:
         try:
@@ -123,6 +131,16 @@ class _Answer(NamedTuple):
     vehicle: str
     words: str
     is_well: bool
+
+
+def _author(name: str, action: str) -> str:
+    """Who asks; what takes motion away is not refused for a name."""
+    if action in FREE_FOR_ALL:
+        return shown_name(name)
+    try:
+        return checked_name(name)
+    except ArgumentError as error:
+        raise UsageError(str(error)) from error
 
 
 def _ask(

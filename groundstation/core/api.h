@@ -156,6 +156,7 @@ enum {
     HOLE = 4,     /* packets are missing before this one: there is a row for them too */
     DISAGREE = 8, /* the stamp is too far from the tick: it was followed */
     AHEAD = 16,   /* the stamp is so far ahead of the ticks that it needs a witness: nothing was done */
+    HEAT = 32,    /* no block is or becomes so warm: the temperature before goes on */
 };
 
 /* A row of the history; see packet_history.py. */
@@ -216,6 +217,7 @@ typedef struct {
     double theta, vx, vy, px, py;
     double rate, force_x, force_y;
     double warmth, temperature_c, reference_c;
+    double warmed_s; /* when that temperature was read */
     double bg, bax, bay; /* at the present temperature */
     Readings good;       /* the newest that were integrated */
 } Reckoner;

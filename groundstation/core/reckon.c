@@ -44,6 +44,14 @@ static int is_wild(Reckoner *r, Readings at, double packets) {
     return 1;
 }
 
+/* Heat goes slowly through a block: what its thermometer says beyond this is its thermometer. */
+static int is_heat(const Reckoner *r, double temperature_c, double t) {
+    const double coldest_c = -60.0, hottest_c = 150.0, step_c = 3.0, fastest_c_s = 1.0;
+    if (!(coldest_c <= temperature_c && temperature_c <= hottest_c)) return 0;
+    return isnan(r->temperature_c) ||
+           within(step_c + fastest_c_s * (t - r->warmed_s), temperature_c - r->temperature_c);
+}
+
 void gs_reckoner_warm(Reckoner *r) {
     r->bg = r->gyro_bias + r->gyro_tempco * r->warmth;
     r->bax = r->acc_bias_x + r->acc_tempco_x * r->warmth;
@@ -127,11 +135,16 @@ int gs_reckoner_add(Reckoner *r) {
     r->newest_ns = t_ns;
     r->newest_s = t;
     const double temperature_c = asked.temperature_c;
-    if (temperature_c != r->temperature_c && temperature_c - temperature_c == 0.0) {
+    if (temperature_c == r->temperature_c) {
+        r->warmed_s = t;
+    } else if (is_heat(r, temperature_c, t)) {
         r->temperature_c = temperature_c;
+        r->warmed_s = t;
         if (isnan(r->reference_c)) r->reference_c = temperature_c;
         r->warmth = temperature_c - r->reference_c;
         gs_reckoner_warm(r);
+    } else if (!isnan(temperature_c)) {
+        flags |= HEAT;
     }
     Readings read = {asked.rate_rad_s, asked.ax_m_s2, asked.ay_m_s2};
     double hole = 0.0;

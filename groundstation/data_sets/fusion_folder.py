@@ -15,6 +15,7 @@ from groundstation.data_sets.stamp_words import (
     complaint_about_rate,
     complaint_about_start,
     complaint_about_units,
+    note_of_rest,
     notes_of,
 )
 from groundstation.data_sets.value_words import (
@@ -78,7 +79,12 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
     covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
     given = FlightData(imu, stars, covariance, known["run_start_s"], noise, notes=notes)
-    data = given.screened(lambda found: notes_of(found, imu[:, 0], table.lines.tolist(), path.name))
+    data = given.screened(
+        lambda found: (
+            *notes_of(found, imu[:, 0], table.lines.tolist(), path.name),
+            *note_of_rest(found.stamp_s, known["run_start_s"], path.name),
+        )
+    )
     stamp_s = data.imu[:, 0]
     _refuse(path, complaint_about_start(stamp_s, known["duration_s"]))
     _refuse(path, complaint_about_rate(stamp_s, period_s))

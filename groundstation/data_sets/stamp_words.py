@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.fusion.stamp_screen import BEHIND, FAR, NOT_FINITE, Screened, spacing_of
+from groundstation.fusion.stamp_screen import BEHIND, FAR, LONG_GAP_S, NOT_FINITE, Screened, spacing_of
 
 Array = NDArray[np.float64]
 
@@ -160,3 +160,15 @@ def notes_of(found: Screened, given_s: Array, lines: Sequence[int], name: str) -
             f"{name}: line {lines[row]}, the clock is set back by {back_s:.6g} s; seconds are counted on"
         )
     return tuple(notes)
+
+
+def note_of_rest(screened_s: Array, run_start_s: float, name: str) -> tuple[str, ...]:
+    """Return a sentence where the end of the rest falls into a hole: what lies behind it is no rest."""
+    t = screened_s[np.isfinite(screened_s)]
+    before, after = t[t <= run_start_s], t[t > run_start_s]
+    if not len(before) or not len(after) or after[0] - before[-1] <= LONG_GAP_S:
+        return ()
+    return (
+        f"{name}: {after[0] - before[-1]:.6g} s are missing where known.run_start_s = {run_start_s:g} ends "
+        f"the rest: the {len(after)} packets behind do not count as one",
+    )

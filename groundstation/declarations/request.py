@@ -46,6 +46,10 @@ class Ack(Message):
     reason: Text
 
 
+LONGEST_NAME, LONGEST_TEXT = 64, 500
+"""Letters; names and reasons are shown on one line of a screen, kept on disk and repeated on the bus."""
+
+
 class ArgumentError(ValueError):
     """What was asked for cannot be understood; the text is one sentence."""
 
@@ -77,7 +81,7 @@ class Argument:
         """The value given, checked.
 
         Raises:
-            ArgumentError: It is of another type, not finite or out of range.
+            ArgumentError: It is of another type, not finite, out of range, too long or more than one line.
         """
         wrong_bool = isinstance(given, bool) and self.kind is not bool
         if self.kind is float and isinstance(given, int) and not wrong_bool:
@@ -88,6 +92,8 @@ class Argument:
         if wrong_bool or not isinstance(given, self.kind):
             wanted = "a number" if self.kind is float else f"a value of type {self.kind.__name__}"
             raise ArgumentError(f"{action}: {self.name} is {_short(given)}, expected {wanted}")
+        if isinstance(given, str):
+            return _line(given, f"{action}: {self.name}", LONGEST_TEXT)
         if isinstance(given, float) and not math.isfinite(given):
             raise ArgumentError(f"{action}: {self.name} is {given}, expected a finite number")
         if isinstance(given, float | int) and not self.low <= given <= self.high:
@@ -137,8 +143,10 @@ class Action:
         """The arguments of a request.
 
         Raises:
-            ArgumentError: They are no JSON object, or not those of the action.
+            ArgumentError: They are no JSON object, or not those of the action; or who asks has no name that
+                can be shown.
         """
+        checked_name(request.author)
         try:
             given = json.loads(request.arguments or "{}")
         except (ValueError, RecursionError):
@@ -146,6 +154,21 @@ class Action:
         if not isinstance(given, dict):
             raise ArgumentError(f"{self.name}: the arguments are no JSON object")
         return self.check(given)
+
+
+def checked_name(author: str) -> str:
+    """The name of who asks.
+
+    Raises:
+        ArgumentError: It is too long to be shown, or more than one line.
+    """
+    return _line(author, "the name of who asks", LONGEST_NAME)
+
+
+def shown_name(author: str) -> str:
+    """The name of who asks for what is never refused: on one line, not too long, never empty."""
+    words = "".join(letter if letter.isprintable() else " " for letter in author).split()
+    return " ".join(words)[:LONGEST_NAME] or "somebody"
 
 
 def table_of(*actions: Action) -> dict[str, Action]:
@@ -158,6 +181,14 @@ def answer(request: Request, now_ns: int, reason: str = "") -> Ack:
     return Ack(
         now_ns, request.vehicle, request.request_id, request.author, request.action, not reason, reason
     )
+
+
+def _line(text: str, what: str, most: int) -> str:
+    if len(text) > most:
+        raise ArgumentError(f"{what} is {len(text)} letters long, expected at most {most}")
+    if not text.isprintable():
+        raise ArgumentError(f"{what} is {_short(text)}, expected one line of letters that can be printed")
+    return text
 
 
 def _short(given: object) -> str:

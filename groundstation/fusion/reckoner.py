@@ -89,6 +89,7 @@ class Reckoner:
             (lib.WILD, "packet_wild"),
             (lib.HOLE, "packet_hole"),
             (lib.DISAGREE, "packet_ticks_and_stamps_disagree"),
+            (lib.HEAT, "packet_temperature_set_aside"),
         )
         self.now = now = ffi.new("Reckoner *")
         self._asked, self._state, self._row, self._hole_row = (

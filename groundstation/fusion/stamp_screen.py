@@ -1,9 +1,10 @@
 """Which stamps of a recorded table are believed: the one judgement for files and recordings.
 
 One wild stamp is an outlier, not a fact. Of a clock that runs on, the most rows that rise together are kept,
-so that neither a stamp far ahead nor one behind takes its neighbours with it. A stamp after a long gap counts
-when others go on from it. Many rows in a row that lie behind are a clock that was set back: a new epoch
-whose seconds are counted on from the one before.
+so that neither a stamp far ahead nor one behind takes its neighbours with it; nor does a stretch of them,
+from which the clock comes back to where it would have been. A stamp after a long gap counts when others go
+on from it. Many rows in a row that lie behind are a clock that was set back: a new epoch whose seconds are
+counted on from the one before.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ WITNESSES = 3
 """Rows that go on from each other after a long gap, so that the gap is one."""
 LONG_GAP_S = 1.0
 LONG_GAP_PERIODS = 20.0
+MOST_JUMPS = 16
+"""Within a stretch of wild stamps, until the clock is back."""
 LARGEST_S = 1e12
 """Beyond is no time; also keeps nanoseconds of a stamp within 64 bits by far of anything that is kept."""
 
@@ -72,6 +75,9 @@ def screen_stamps(stamp_s: Array, period_s: float) -> Screened:
         aside[NOT_FINITE] = np.flatnonzero(~np.isfinite(stamp_s))
         aside[FAR] = np.flatnonzero(np.isfinite(stamp_s) & (np.abs(stamp_s) >= LARGEST_S))
     out = np.full(len(stamp_s), np.nan)
+    is_out = _out_and_back(stamp_s[rows], period_s)
+    aside[FAR] = np.concatenate([aside[FAR], rows[is_out]])
+    rows = rows[~is_out]
     t = stamp_s[rows]
     shift_s, set_back = 0.0, []
     edges = [0, *set_back_at(t), len(t)]
@@ -122,6 +128,29 @@ def set_back_at(t: Array, reach: int = EPOCH_ROWS) -> list[int]:
         if np.median(t[k : k + reach]) < np.median(t[k - reach : k]):
             found.append(k)
     return found
+
+
+def _out_and_back(t: Array, period_s: float) -> NDArray[np.bool_]:
+    """Return which rows lie far off while their neighbours go on from each other without them.
+
+    A clock that was set back does not come to stand where it would have been: what follows a stretch of
+    wild stamps does. A stretch is no longer than half of the table, nor full of jumps itself.
+    """
+    is_out = np.zeros(len(t), dtype=np.bool_)
+    gap_s = LONG_GAP_PERIODS * period_s
+    jumps = np.flatnonzero(np.abs(np.diff(t)) > gap_s) + 1
+    begun = 0
+    for place, first in enumerate(jumps.tolist()):
+        if first <= begun:
+            continue
+        later = jumps[place + 1 : place + 1 + MOST_JUMPS]
+        later = later[later - first < len(t) // 2]
+        missed_s = t[later] - t[first - 1]
+        goes_on = (missed_s > 0.0) & (missed_s <= (later - first + 1) * period_s + gap_s)
+        if goes_on.any():
+            begun = int(later[goes_on][0])
+            is_out[first:begun] = True
+    return is_out
 
 
 def _rising(t: Array) -> NDArray[np.intp]:

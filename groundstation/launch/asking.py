@@ -1,5 +1,6 @@
 """Requests to a running rig, and their answers."""
 
+import getpass
 import itertools
 import json
 import os
@@ -25,6 +26,14 @@ _SEQUENCE = itertools.count(1)
 def operator() -> str:
     """What this process is called on the bus: a process of its own, as the recording sees it."""
     return f"operator_{os.getpid()}"
+
+
+def user_name() -> str:
+    """In whose name this process asks; a user whom the machine has no name for goes by his number."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
 
 
 def fresh_number() -> int:

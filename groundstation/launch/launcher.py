@@ -15,10 +15,11 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
-from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.bus.zenoh_bus import ZenohBus, key_of
 from groundstation.declarations.errors import GroundStationError, RigError
 from groundstation.declarations.names import LABORATORY, RECORDER
 from groundstation.declarations.node import COMMANDS
+from groundstation.declarations.request import Ack
 from groundstation.declarations.rig import STATION_CHANNEL, Rig
 from groundstation.launch import process, recorder
 from groundstation.launch.child import Child, start_python
@@ -91,6 +92,7 @@ class Launcher:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
         self.endpoint, self.bus = _open_hub()
+        self.bus.keep_wanted(key_of(Ack.TOPIC, "*"))  # who asks has come just before
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
 
     @property
@@ -255,11 +257,8 @@ class Launcher:
         for name in sorted(self._waiting):
             child = self._children[name]
             child.started_s = self._time.now_s
-            child.write(
-                pickle.dumps(
-                    Go({**self._addresses, f"{STATION_CHANNEL}memory": self._memory.address(child.restarts)})
-                )
-            )
+            memory = self._memory.address(has_kept=child.restarts > 0 and child.has_been_ready)
+            child.write(pickle.dumps(Go({**self._addresses, f"{STATION_CHANNEL}memory": memory})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:

@@ -25,9 +25,9 @@ class Memory:
     folder: Path
     lock: int
 
-    def address(self, restarts: int) -> str:
-        """Where a process finds it that was started again so often."""
-        return f"{self.folder}{f'?{EXPECTED}' if restarts else ''}"
+    def address(self, *, has_kept: bool) -> str:
+        """Where a process finds it; one that ran before must find what it kept then."""
+        return f"{self.folder}{f'?{EXPECTED}' if has_kept else ''}"
 
     def forget(self) -> None:
         """Forget what was kept: a newly started emulated laboratory starts fresh.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from groundstation.supervision.apart import too_near
 from groundstation.supervision.fault_board import Standing
+from groundstation.supervision.faults import Response
 from groundstation.supervision.sightings import Sightings
 
 OLDEST_FIX_S = 3.0
@@ -114,12 +115,14 @@ def _lesser_faults(question: Question) -> str:
 
 
 def _names(rows: Iterable[Standing]) -> str:
-    return "; ".join(f"{row.fault.id} ({row.detail})" for row in rows if row.fault.blocks_arming)
+    """Those that keep it down, and those whose response would land it again as soon as it is armed."""
+    against = (row for row in rows if row.fault.blocks_arming or row.response >= Response.LAND)
+    return "; ".join(f"{row.fault.id} ({row.detail})" for row in against)
 
 
 CHECKS: tuple[Check, ...] = (
     Check("heartbeats", "fusion, fault detector and valve node publish", _heartbeats),
-    Check("faults", "no fault stands that keeps it on the ground", _faults),
+    Check("faults", "no fault stands that keeps it on the ground, or would land it", _faults),
     Check("lesser faults", "nor one that a person may override", _lesser_faults, may_be_overridden=True),
     Check("rest", "unbroken rest with good IMU data, as long as the rig asks for", _rest,
           may_be_overridden=True),

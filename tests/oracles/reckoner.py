@@ -33,8 +33,8 @@ class OracleReckoner:
         "_force_x", "_force_y", "_gx", "_gy", "_gyro_gain", "_gyro_lag", "_lag_difference", "_map",
         "_mxx", "_mxy", "_myx", "_myy", "_period", "_px", "_py", "_rate_read", "_reference_c",
         "_rx", "_ry", "_screen", "_slope_x", "_slope_y", "_temperature_c", "_theta", "_until_lookup",
-        "_vx", "_vy", "_warmth", "_x", "checkpoint_s", "crossed_s", "has_pose", "history", "is_lost",
-        "newest_ns", "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
+        "_vx", "_vy", "_warmed_s", "_warmth", "_x", "checkpoint_s", "crossed_s", "has_pose", "history",
+        "is_lost", "newest_ns", "newest_s", "origin_ns", "rate_rad_s", "rest_from_s", "rest_to_s", "variance",
     )  # fmt: skip
 
     def __init__(self, noise: NoiseModel, counters: Counters, table_map: SlopeGrid | None = None) -> None:
@@ -63,6 +63,7 @@ class OracleReckoner:
         self._doubt = StampDoubt()
         self._warmth = 0.0
         self._temperature_c = self._reference_c = math.nan
+        self._warmed_s = 0.0
         self._theta = self._vx = self._vy = self._px = self._py = 0.0
         self._x = es.initial_state(noise).tolist()
         self._unpack()
@@ -110,8 +111,13 @@ class OracleReckoner:
             dt = t - self.newest_s
         self.newest_ns, self.newest_s = t_ns, t
         self._doubt.count = 0
-        if temperature_c != self._temperature_c and temperature_c - temperature_c == 0.0:
+        if temperature_c == self._temperature_c:
+            self._warmed_s = t
+        elif self._is_heat(temperature_c, t):
+            self._warmed_s = t
             self._warm(temperature_c)
+        elif not math.isnan(temperature_c):
+            self._counters.add("packet_temperature_set_aside")
         hole = 0.0
         if self._screen.is_wild(rate, ax, ay, dt / self._period):
             self._counters.add("packet_wild")
@@ -219,6 +225,12 @@ class OracleReckoner:
             self.rate_rad_s = self._force_x = self._force_y = 0.0
         else:
             self.rate_rad_s = (self._rate_read - self._bg) * self._gyro_gain
+
+    def _is_heat(self, temperature_c: float, t: float) -> bool:
+        if not -60.0 <= temperature_c <= 150.0:
+            return False
+        step = abs(temperature_c - self._temperature_c)
+        return math.isnan(self._temperature_c) or step <= 3.0 + 1.0 * (t - self._warmed_s)
 
     def _warm(self, temperature_c: float) -> None:
         self._temperature_c = temperature_c

@@ -7,10 +7,10 @@ from groundstation.control.state import ControlState
 from groundstation.control.valve_health import health_of
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
-from groundstation.declarations.lease import Lease, LeaseCheck
+from groundstation.declarations.lease import FREE_FOR_ALL, Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, ArgumentError, Request, answer
+from groundstation.declarations.request import Ack, ArgumentError, Request, answer, shown_name
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
@@ -84,7 +84,7 @@ class SupervisorNode(Node):
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
             case StopPress():
-                self._supervisor.press(message.author, message.press_id, now_ns)
+                self._supervisor.press(shown_name(message.author), message.press_id, now_ns)
                 yield from self._rule(now_ns)
             case Request() if self._answers(message.action):
                 reason = self._carry_out(message, now_ns)
@@ -163,15 +163,18 @@ class SupervisorNode(Node):
             return self._absent[request.action]
         if request.action not in ACTIONS:
             return f"unknown action '{request.action}' (known: {', '.join(sorted(self._known))})"
-        try:
-            given = ACTIONS[request.action].read(request)
-        except ArgumentError as error:
-            return str(error)
+        author = shown_name(request.author)
         if request.action == Event.STOP:
-            self._supervisor.press(request.author, request.request_id, now_ns)
+            self._supervisor.press(author, request.request_id, now_ns)
             return ""
-        override = str(given.get("override", ""))
-        return self._supervisor.request(Event(request.action), request.author, now_ns, override)
+        override = ""
+        if request.action not in FREE_FOR_ALL:  # those are never refused for how they are asked
+            try:
+                given = ACTIONS[request.action].read(request)
+            except ArgumentError as error:
+                return str(error)
+            override = str(given.get("override", ""))
+        return self._supervisor.request(Event(request.action), author, now_ns, override)
 
     def _rule(self, now_ns: int) -> Iterator[Message]:
         ruling = self._supervisor.ruling()

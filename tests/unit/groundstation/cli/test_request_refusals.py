@@ -2,6 +2,7 @@
 
 import json
 import os
+import pwd
 import subprocess
 import sys
 
@@ -37,6 +38,10 @@ def refused(capsys, *words):
         (["all", "stop", "now"], "stop takes no arguments, found 1 words"),
         (["all", "go_to", "0", "0", "0"], "go_to is asked of one vehicle; all can be asked to stop, land, "),
         (["all", "push", "0", "0", "0", "1"], "push is asked of one vehicle; all can be asked to stop, "),
+        (["alpha", "fly", "--as", "x" * 65], "the name of who asks is 65 letters long, expected at most 64"),
+        (["alpha", "fly", "--as", "a\nb"], "the name of who asks is 'a\\nb', expected one line"),
+        (["alpha", "fly", "override=\x1b[2J"], "fly: override is '\\x1b[2J', expected one line"),
+        (["alpha", "stop", "--as", "a\nb"], "no rig is running"),
         (["alpha", "stop", "--pid", "1"], "no rig is running with process 1"),
     ],
 )
@@ -49,6 +54,20 @@ def test_what_cannot_be_asked_is_refused(words, reason, capsys):
 def test_a_wait_without_end_is_refused(words, seconds, capsys):
     assert call([*words, "--timeout", seconds]) == 2
     assert "Invalid value for '--timeout'" in capsys.readouterr().err
+
+
+def test_a_user_whom_the_machine_has_no_name_for_may_stop_all(capsys, monkeypatch):
+    for name in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+    RunningRig(os.getpid(), "one", "tcp/127.0.0.1:1", ("alpha",)).announce()
+    assert call(["request", "all", "stop"]) == 1
+    assert "the hub at tcp/127.0.0.1:1 cannot be reached" in capsys.readouterr().err
+
+
+def test_a_parameter_that_is_given_twice_is_refused(capsys):
+    assert call(["inject", "alpha", "stuck_open_valve", "--valve", "3", "--valve", "4"]) == 2
+    assert capsys.readouterr().err == "groundstation: --valve is given twice\n"
 
 
 def test_the_vehicle_must_be_flown_by_exactly_one_run(capsys):

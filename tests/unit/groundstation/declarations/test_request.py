@@ -14,6 +14,8 @@ from groundstation.declarations.request import (
     ArgumentError,
     Request,
     answer,
+    checked_name,
+    shown_name,
     table_of,
 )
 
@@ -31,6 +33,9 @@ TURN = Action(
 NOTHING = Action("halt", "controller", "stand still")
 
 
+SAY = Action("say", "speaker", "say something", (Argument("words", kind=str),))
+
+
 def asked(arguments):
     return Request(5, "alpha", 7, "operator", "turn", arguments)
 
@@ -42,10 +47,13 @@ def refusal(action, given):
     return str(refused.value)
 
 
+LINES = st.text(st.characters(exclude_categories=("C", "Z"), include_characters=" "), max_size=500)
+
+
 @given(
     st.fixed_dictionaries(
         {"heading_rad": st.floats(-math.pi, math.pi)},
-        optional={"rounds": st.integers(0, 9), "note": st.text(), "slowly": st.booleans()},
+        optional={"rounds": st.integers(0, 9), "note": LINES, "slowly": st.booleans()},
     )
 )
 def test_what_was_asked_for_comes_back_complete(given):
@@ -114,6 +122,31 @@ def test_an_action_without_arguments_takes_none():
 def test_what_is_no_json_object_is_refused(text):
     with pytest.raises(ArgumentError, match=r"^turn: the arguments are no JSON object$"):
         TURN.read(asked(text))
+
+
+WILD_TEXTS = ["a\nb", "\x1b[2J", "\x00", "\r", "\udcff", "\u2028", "x" * 501, "y" * 100_000]
+
+
+@pytest.mark.parametrize("text", WILD_TEXTS)
+def test_a_text_that_is_no_line_for_people_is_refused_and_not_repeated(text):
+    sentence = refusal(SAY, {"words": text})
+    assert sentence.startswith("say: words is ")
+    assert sentence.isprintable()
+    assert len(sentence) < 120
+    with pytest.raises(ArgumentError, match="the name of who asks is "):
+        checked_name(text)
+    with pytest.raises(ArgumentError, match="the name of who asks is "):
+        TURN.read(Request(5, "alpha", 7, text, "turn", '{"heading_rad": 1.0}'))
+    shown = shown_name(text)
+    assert shown.isprintable()
+    assert 0 < len(shown) <= 64
+
+
+@pytest.mark.parametrize("text", ["", "Anna Müller", "王", "x" * 64])
+def test_a_name_that_can_be_shown_stays_as_it_is(text):
+    assert checked_name(text) == text
+    assert shown_name(text) == (text or "somebody")
+    assert SAY.check({"words": text}) == {"words": text}
 
 
 def test_an_answer_names_what_was_asked_and_by_whom():

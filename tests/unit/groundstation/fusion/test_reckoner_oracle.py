@@ -46,7 +46,7 @@ packets = st.tuples(
     readings,
     readings,
     readings,
-    st.sampled_from([25.0, 25.1, math.nan, math.inf]),
+    st.sampled_from([25.0, 25.1, 28.2, 31.0, math.nan, math.inf, 1e300, -9249.0]),
 )
 
 

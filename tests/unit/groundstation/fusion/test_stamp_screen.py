@@ -83,3 +83,28 @@ def test_many_wild_stamps_are_all_found(clock):
 @pytest.mark.parametrize("given", [[], [1.0], [np.nan] * 30, [5.0] * 30])
 def test_next_to_nothing_is_no_trouble(given):
     assert kept(screen_stamps(np.array(given), PERIOD_S)).sum() <= 1
+
+
+@pytest.mark.parametrize("rows", [3, 10, 19, 20, 25, 300, 1400])
+@pytest.mark.parametrize("off_s", [0.5, 10.0, 1e5, 1.76e9, -0.5, -10.0, -1e6])
+def test_a_stretch_of_wild_stamps_from_which_the_clock_comes_back_is_set_aside_and_no_other(
+    clock, rows, off_s
+):
+    given = clock.copy()
+    given[1000 : 1000 + rows] += off_s
+    found = screen_stamps(given, PERIOD_S)
+    want = np.ones(N, bool)
+    want[1000 : 1000 + rows] = False
+    np.testing.assert_array_equal(kept(found), want)
+    np.testing.assert_array_equal(found.stamp_s[want], clock[want])
+    assert found.set_back == ()
+
+
+def test_stretches_one_after_the_other_and_with_wild_stamps_inside_are_all_set_aside(clock):
+    given = clock.copy()
+    for first, rows, off_s in ((100, 50, 1e4), (400, 30, -60.0), (2000, 200, 3.0)):
+        given[first : first + rows] += off_s
+    given[[410, 2050, 2051]] += 1e6
+    found = screen_stamps(given, PERIOD_S)
+    assert N - kept(found).sum() == 280
+    np.testing.assert_array_equal(found.stamp_s[kept(found)], clock[kept(found)])

@@ -127,7 +127,15 @@ def test_lesser_faults_can_be_overridden(known):
 
 
 def test_faults_that_only_count_in_flight_keep_nothing_down(known):
-    assert against(known, "edge_unavoidable", "leader_old") == ()
+    assert against(known, "leader_old", "commands_restarted") == ()
+
+
+def test_a_fault_that_would_land_it_again_keeps_it_down_until_it_is_gone(known):
+    assert against(known, "edge_unavoidable") == ("faults: edge_unavoidable (why)",)
+    late = Standing(FAULTS["controller_silent"], "why", 0, 6 * S)
+    assert objections(Question(known, (late,), 8.0, 6 * S)) == ("faults: controller_silent (why)",)
+    gone = Standing(FAULTS["edge_unavoidable"], "why", 0, 0, is_there=False)
+    assert objections(Question(known, (gone,), 8.0, 6 * S)) == ()
 
 
 def test_checks_have_names_of_their_own_and_say_what_must_hold():

@@ -166,6 +166,14 @@ class TestFaults:
         assert flying.run(1.5) == ["holding", "flying"]
         assert flying.ruling.memory.cause == "the fault is gone"
 
+    def test_what_landed_it_is_gone_before_it_arms_again(self, flying):
+        flying.status = "flying"
+        flying.silent.add("demand")
+        assert flying.run(5.0)[-1] == "holding"
+        modes = flying.run(4.0)
+        assert modes[:4] == ["holding", "landing", "resting", "armed"]
+        assert modes.count("armed") == 1, "it does not arm and land in turns while the fault stands"
+
     def test_what_a_person_brakes_is_not_let_go_by_a_fault_that_ends(self, flying):
         flying.ask(Event.BRAKE)
         flying.findings = {"camera_torn": ""}

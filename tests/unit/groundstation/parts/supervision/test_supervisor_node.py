@@ -257,10 +257,22 @@ class TestRequests:
         assert ruling.cause == "armed by request: override: on foam"
 
     def test_arguments_that_are_none_of_the_action_are_refused(self, landed):
-        ack, rulings = landed.ask("land", now=True)
+        ack, rulings = landed.ask("release", now=True)
         assert not ack.accepted
-        assert ack.reason == "land has no argument 'now': it takes no arguments"
+        assert ack.reason == "release has no argument 'now': it takes no arguments"
         assert rulings == []
+
+    @pytest.mark.parametrize("arguments", ["{", '{"now": 1}', "[]", "9" * 5000])
+    @pytest.mark.parametrize("author", ["", "a\nb", "x" * 10_000])
+    @pytest.mark.parametrize("action", ["stop", "land", "disarm", "float_off", "brake"])
+    def test_what_takes_motion_away_is_not_refused_for_how_it_is_asked(self, node, action, author, arguments):
+        node.fly()
+        outputs = node.receive(Request(0, "alpha", 9, author, action, arguments))
+        (ack,) = (message for message in outputs if isinstance(message, Ack))
+        (ruling,) = (message for message in outputs if isinstance(message, Supervision))
+        assert (ack.accepted, ack.reason, ack.author) == (True, "", author)
+        assert ruling.mode in ("braking", "landing")
+        assert ruling.author in ("somebody", "a b", "x" * 64)
 
     def test_an_action_that_nobody_knows_is_refused_with_those_that_are_known(self, landed):
         ack, _ = landed.ask("jump")
