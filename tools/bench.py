@@ -28,6 +28,7 @@ from bench import (  # noqa: E402
     deaths,
     fault_flights,
     fresh_clone,
+    hostile_commands,
     house,
     laboratory_fit,
     live,
@@ -67,6 +68,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "live_faults": live_faults.measure,
         "outage": outage.measure,
         "fault_flights": fault_flights.measure,
+        "hostile_commands": hostile_commands.measure,
         "house": house.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
@@ -94,7 +96,16 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
 FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 """Subjects of recorded data, and what their folder must hold."""
 ON_REQUEST = frozenset(
-    {"campaign", "fresh_clone", "fault_flights", "laboratory_fit", "live_faults", "deaths", *FOLDERS}
+    {
+        "campaign",
+        "fresh_clone",
+        "fault_flights",
+        "hostile_commands",
+        "laboratory_fit",
+        "live_faults",
+        "deaths",
+        *FOLDERS,
+    }
 )
 
 
