@@ -1,9 +1,13 @@
 """From landed to flying, and what closes the valves when a node publishes nothing any more."""
 
+import json
+
+import numpy as np
 import pytest
 
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.node import Node
+from groundstation.parts.control.messages import Wrench
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
@@ -13,8 +17,8 @@ from groundstation.runners.slot import Slot
 SILENT_S = 5.0
 
 
-def mute(flight, name):
-    """From SILENT_S on nothing that a node publishes gets out, as if it had died."""
+def mute(flight, name, silent_s=SILENT_S):
+    """From then on nothing that a node publishes gets out, as if it had died."""
     slots = {slot.key: slot for slot in flight.runner._step.slots}
     slot = slots[f"alpha/{name}"]
     node = slot.node
@@ -30,11 +34,11 @@ def mute(flight, name):
 
         def receive(self, message, now_ns):
             made = tuple(node.receive(message, now_ns))
-            return made if now_ns < SILENT_S * 1e9 else ()
+            return made if now_ns < silent_s * 1e9 else ()
 
         def tick(self, now_ns):
             made = tuple(node.tick(now_ns))
-            return made if now_ns < SILENT_S * 1e9 else ()
+            return made if now_ns < silent_s * 1e9 else ()
 
     assert isinstance(slot, Slot)
     slot.node = Mute(node.vehicle, node.tick_period_ns)
@@ -64,6 +68,25 @@ def test_a_silent_controller_makes_the_mux_brake(fly):
     assert "controller_silent" in flight.faults()
     speeds = [row.velocity_table_m_s for row in flight.of(ReferenceState, start_s=SILENT_S + 3.5)]
     assert max(max(map(abs, speed)) for speed in speeds) < 0.005
+
+
+def test_silence_of_a_moving_vehicles_controller_is_braked_within_three_tenths_of_a_second(fly):
+    """From the last wrench to the first report of a valve that the brake opened."""
+    flight = fly()
+    mute(flight, "controller", silent_s=9.0)
+    flight.run(4.5)
+    flight.request("go_to", json.dumps({"x_m": -0.9, "y_m": 0.1, "heading_rad": 0.0}))
+    flight.run(6.0)
+    last_s = flight.of(Wrench)[-1].stamp_ns * 1e-9
+    assert last_s == pytest.approx(9.0, abs=0.2)
+    before = flight.of(ReferenceState, start_s=last_s)[0]
+    assert np.hypot(*before.velocity_table_m_s) > 0.04
+    first_s = next(
+        row.stamp_ns * 1e-9 for row in flight.of(ValveSelection, start_s=last_s) if row.source == "brake"
+    )
+    pushed_s = next(row.stamp_ns * 1e-9 for row in flight.of(ValveStatus, start_s=first_s) if row.open_mask)
+    assert first_s - last_s > 0.2  # two wrenches may be late
+    assert pushed_s - last_s <= 0.3
 
 
 def test_a_silent_mux_makes_the_guard_close(fly):
