@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from groundstation.declarations.message import Message
 from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
 from groundstation.parts.operation.messages import Diagnostics
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
+from groundstation.parts.valves.messages import Outlook, ValveCommand, ValveSelection, ValveStatus
 
 SILENT_S = 3.0
 """So long after the bus was opened a valve node should have reported."""
 BUS = "valve_bus"
 """Channel of the bus that all valve nodes share."""
+SOON_S = 60.0
+"""Later than this nobody wants to know when it would coast over the edge."""
 _VALVES = 8
 _GATES = {"open": "armed"}
 """Words for people: that a gate lets commands through does not mean that a valve is open."""
@@ -82,6 +84,27 @@ class SourceGauge(Gauge):
         return cell(text, Level.WARNING if selection.source in ("closed", "brake") else Level.PLAIN)
 
 
+class OutlookGauge(Gauge):
+    """Way to rest, what is met first, and what the safety filter changes commands for."""
+
+    label = "stops within"
+    newest = (Outlook, ValveCommand)
+
+    def cell(self, newest: Newest, now_ns: int) -> Cell:
+        del now_ns
+        outlook, command = newest.get(Outlook), newest.get(ValveCommand)
+        if outlook is None or command is None or command.gate != "open":
+            return NOTHING
+        shown = f"{1e3 * outlook.stopping_distance_m:.0f} mm"
+        if outlook.time_to_edge_s < SOON_S:
+            shown += f", edge in {outlook.time_to_edge_s:.0f} s"
+        if outlook.nearest:
+            shown += f", {outlook.nearest} {1e3 * outlook.nearest_room_m:.0f} mm off"
+        if not outlook.limited_by:
+            return cell(shown)
+        return cell(f"{shown}, held back for: {outlook.limited_by}", Level.WARNING)
+
+
 class TankGauge(Gauge):
     """Pressure, and whether the float air is on."""
 
@@ -96,4 +119,9 @@ class TankGauge(Gauge):
         return cell(f"{status.pressure_pa * 1e-5:.0f} bar" + ("" if status.floating else ", float air off"))
 
 
-GAUGES = (GaugeRow(20, GateGauge), GaugeRow(30, SourceGauge), GaugeRow(130, TankGauge))
+GAUGES = (
+    GaugeRow(20, GateGauge),
+    GaugeRow(30, SourceGauge),
+    GaugeRow(35, OutlookGauge),
+    GaugeRow(130, TankGauge),
+)

@@ -28,7 +28,7 @@ from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves import gauges as valves
 from groundstation.parts.valves import messages as v
 
-_VALVES = (v.ValveStatus, v.ValveDemand, v.ValveSelection, v.ValveCommand, v.CanOut)
+_VALVES = (v.Outlook, v.ValveStatus, v.ValveDemand, v.ValveSelection, v.ValveCommand, v.CanOut)
 _ZEROS = {"string": "", "bool": False, "uint8[]": b"", "float32[]": np.empty(0, np.float32)}
 
 

@@ -13,7 +13,7 @@ from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.stars.messages import SkyChange, StarFix
 from groundstation.parts.supervision.messages import Faults, Supervision
-from groundstation.parts.valves.messages import ValveCommand, ValveSelection, ValveStatus
+from groundstation.parts.valves.messages import Outlook, ValveCommand, ValveSelection, ValveStatus
 from groundstation.watch.monitor import Monitor
 
 SECOND_NS = 1_000_000_000
@@ -64,6 +64,7 @@ def test_the_rows_stand_in_their_order(watched):
         "faults",
         "valves",
         "commanded by",
+        "stops within",
         "position, heading",
         "off its goal",
         "  rms of 30 s, by truth",
@@ -150,6 +151,17 @@ def test_levels_say_what_is_bad(watched):
     assert cells["position, heading"].pieces[-1] == ("  LOST", Level.BAD)
     assert cells["tank"].text == "300 bar, float air off"
     assert cells["IMU"].pieces[1:] == (("  3 lost", Level.WARNING), ("  frozen", Level.BAD))
+
+
+def test_where_it_can_stop_is_shown_while_it_flies(watched):
+    watched.give(
+        Outlook, 1, stopping_distance_m=0.123, time_to_edge_s=14.2, nearest="beta", nearest_room_m=0.4
+    )
+    assert watched.cells()["stops within"].text == "-"
+    watched.give(ValveCommand, 1, gate="open")
+    assert watched.cells()["stops within"].pieces == (("123 mm, edge in 14 s, beta 400 mm off", Level.PLAIN),)
+    watched.give(Outlook, 2, stopping_distance_m=0.05, time_to_edge_s=math.inf, limited_by="edge, beta")
+    assert watched.cells()["stops within"].pieces == (("50 mm, held back for: edge, beta", Level.WARNING),)
 
 
 def test_fixes_are_counted_by_what_became_of_them(watched):
