@@ -4,7 +4,7 @@ Independent of the firmware emulator on purpose; every number that a test assert
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from groundstation.control.averaging import RateMean
 from groundstation.control.controller import NO_NEIGHBOURS, Controller
 from groundstation.control.modulation import PulseConfig, PulseModulator
 from groundstation.control.state import NO_WRENCH, ControlState, Goal
+from groundstation.control.valve_health import HEALTHY, ValveHealth
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 
 STEP_S = 0.001
@@ -29,6 +30,10 @@ class World:
     open_delay_s: float = 0.006
     close_delay_s: float = 0.005
     thrust_spread: float = 0.05  # per valve, one sigma
+    sag: float = 1.0  # of thrust per further open valve
+    broken: Mapping[int, ValveHealth] = field(default_factory=dict)
+    broken_from_s: float = 20.0
+    found_after_s: float = 0.3  # the modulator is told of it then
     latency_s: float = 0.040  # state age when the controller reads it
     fix_period_s: float = 0.65  # star tracker busy 0.6 s per frame
     fix_delay_s: float = 0.6
@@ -147,8 +152,13 @@ def fly(
     close_at_s = np.full(len(vehicle.valves), -1.0)  # from the start of the period
     rate_mean = RateMean()
     flight, wrench, pulses = Flight(), NO_WRENCH, None
+    states = [world.broken.get(valve, HEALTHY) for valve in range(len(vehicle.valves))]
+    is_told = False
     for count in range(round(duration_s / pulse.period_s)):
         now_s = count * pulse.period_s
+        if world.broken and not is_told and now_s >= world.broken_from_s + world.found_after_s:
+            is_told = True
+            modulator.take_health(states)
         updates = round(pulse.period_s / update_s)
         for update in range(updates):
             # the updates since the last pulses, the newest last; each reads a state of `latency_s` ago
@@ -175,8 +185,13 @@ def fly(
             on_s > 0.0, on_s + world.close_delay_s, np.minimum(close_at_s, world.close_delay_s)
         )
         is_open = (instants[:, None] >= np.where(on_s > 0.0, opens_s, 0.0)) & (instants[:, None] < close_at_s)
+        given = is_open.astype(float)
+        if now_s >= world.broken_from_s:
+            for valve, state in world.broken.items():
+                given[:, valve] = np.where(is_open[:, valve], state.open_share, state.shut_share)
+        given *= (world.sag ** np.maximum(0.0, given.sum(axis=1) - 1.0))[:, None]
         cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-        force = is_open @ columns.T @ np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))
+        force = given @ columns.T @ np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))
         new_speeds = velocity + np.cumsum(force / inertia + constant, axis=0) * STEP_S
         new_poses = pose + np.cumsum(new_speeds, axis=0) * STEP_S
         poses = np.vstack([poses[-late_steps - 1 :], new_poses])
@@ -186,7 +201,7 @@ def fly(
         flight.time_s.append(now_s + pulse.period_s)
         flight.pose.append(tuple(pose.tolist()))
         flight.velocity.append(tuple(velocity.tolist()))
-        flight.gas_n_s += float((is_open * np.linalg.norm(columns[:2], axis=0)).sum()) * STEP_S
+        flight.gas_n_s += float((given * np.linalg.norm(columns[:2], axis=0)).sum()) * STEP_S
         fired = [on for on in pulses.on_time_ms if on]
         flight.pulses += len(fired)
         flight.shortest_ms = min([flight.shortest_ms, *fired])
