@@ -1,7 +1,7 @@
 """Station keeping with a valve that fails in flight and of which the allocation is told 0.3 s later.
 
-On the mock-up of conftest: slow and unlike valves, a supply that sags, late fixes, a tilt of up to 0.43 mrad in
-any direction. Twenty draws of seed, slope and valve for each failure.
+On the mock-up of conftest: slow and unlike valves, a supply that sags, late fixes, a tilt of up to 0.43 mrad
+in any direction. Twenty draws of seed, slope and valve for each failure.
 """
 
 import math
