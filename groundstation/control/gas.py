@@ -23,6 +23,8 @@ _FILLED_SIGMAS = 8.0
 _SURE = 3.0
 """A consumption below so many sigmas has not been seen."""
 _LEAST_SAMPLES = 10
+_ONE = 1e-6
+"""Columns that differ by less are one; smaller, and variances that cancel would leave only rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,8 +139,8 @@ def _fit(columns: Floats, pressure_pa: Floats, sigma_pa: float) -> tuple[Floats,
     size = np.maximum(np.abs(columns).max(axis=0), 1e-9)
     scaled = columns / size
     u, lengths, axes = np.linalg.svd(scaled, full_matrices=False)
-    seen = np.maximum(lengths, 1e-9 * lengths[0])
-    value = axes.T @ ((u.T @ pressure_pa) * (lengths > 1e-9 * lengths[0]) / seen)
+    seen = np.maximum(lengths, _ONE * lengths[0])
+    value = axes.T @ ((u.T @ pressure_pa) * (lengths > _ONE * lengths[0]) / seen)
     left = pressure_pa - scaled @ value
     variance = max(sigma_pa**2, float(left @ left) / max(1, len(left) - 3))
     covariance = (axes.T / seen**2) @ axes * variance
@@ -169,11 +171,13 @@ def _lasts(room_pa: float, value: Floats, covariance: Floats, use: _Steering) ->
     """
     weights = np.array([0.0, 1.0, use.valves])
     rate_pa_s = float(weights @ value)
-    rate_sigma = math.sqrt(float(weights @ covariance @ weights))
+    rate_sigma = math.sqrt(max(0.0, float(weights @ covariance @ weights)))
     if rate_pa_s <= _SURE * rate_sigma:
         return None
     span_s = max(0.0, room_pa / rate_pa_s)
     slope = (np.array([1.0, 0.0, 0.0]) - span_s * weights) / rate_pa_s
     per_valve = span_s * float(value[2]) / rate_pa_s
     scatter = use.density * (1.0 / use.while_s + 1.0 / max(span_s, 1.0))
-    return Lasts(span_s, math.sqrt(float(slope @ covariance @ slope) + per_valve**2 * scatter))
+    # where float and valves were one, variances are huge and cancel but for rounding
+    by_fit = max(0.0, float(slope @ covariance @ slope))
+    return Lasts(span_s, math.sqrt(by_fit + per_valve**2 * scatter))

@@ -1,12 +1,17 @@
 """What people are shown of the valves: gate, open valves, whose command, the tank, a silent valve node."""
 
 import math
+from collections import deque
 from collections.abc import Iterator
 
+import numpy as np
+
+from groundstation.control.gas import GasConfig, GasHistory, GasLeft, gas_left
 from groundstation.declarations.message import Message
 from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.valves.messages import Outlook, ValveCommand, ValveSelection, ValveStatus
+from groundstation.supervision.sightings import LEAST_TANK_PA
 
 SILENT_S = 3.0
 """So long after the bus was opened a valve node should have reported."""
@@ -14,6 +19,8 @@ BUS = "valve_bus"
 """Channel of the bus that all valve nodes share."""
 SOON_S = 60.0
 """Later than this nobody wants to know when it would coast over the edge."""
+KEPT_ROWS, LONGEST_GAP_S, KNOWN_NS, FEW_MINUTES = 1200, 2.0, 5_000_000_000, 3.0
+"""Of the tank: readings kept, one a second; longest hole; how often it is computed; what is little."""
 _VALVES = 8
 _GATES = {"open": "armed"}
 """Words for people: that a gate lets commands through does not mean that a valve is open."""
@@ -106,17 +113,54 @@ class OutlookGauge(Gauge):
 
 
 class TankGauge(Gauge):
-    """Pressure, and whether the float air is on."""
+    """Pressure, how long that lasts at the use of late, and whether the float air is on.
+
+    Looks as often as people do: which valves are open then is a sample of how long they are.
+    """
 
     label = "tank"
     newest = (ValveStatus,)
+
+    def __init__(self, vehicle: str) -> None:
+        super().__init__(vehicle)
+        self._rows: deque[tuple[float, float, float, float]] = deque(maxlen=KEPT_ROWS)
+        self._stamp_ns: int | None = None
+        self._afloat_s = self._valves_s = 0.0
+        self._left: GasLeft | None = None
+        self._known_ns = 0
+
+    def look(self, newest: Newest, now_ns: int) -> Iterator[str]:
+        status = newest.get(ValveStatus)
+        if status is None or status.stamp_ns == self._stamp_ns:
+            return
+        if self._stamp_ns is not None:
+            span_s = min(max(0.0, 1e-9 * (status.stamp_ns - self._stamp_ns)), LONGEST_GAP_S)
+            self._afloat_s += span_s * status.floating
+            self._valves_s += span_s * status.open_mask.bit_count()
+        self._stamp_ns = status.stamp_ns
+        stamp_s = 1e-9 * status.stamp_ns
+        if not self._rows or stamp_s - self._rows[-1][0] >= 1.0:
+            self._rows.append((stamp_s, status.pressure_pa, self._afloat_s, self._valves_s))
+        if now_ns - self._known_ns >= KNOWN_NS:
+            self._known_ns = now_ns
+            columns = np.array(self._rows).reshape(-1, 4).T
+            self._left = gas_left(GasHistory(*columns), GasConfig(reserve_pa=LEAST_TANK_PA))
+        yield from ()
 
     def cell(self, newest: Newest, now_ns: int) -> Cell:
         del now_ns
         status = newest.get(ValveStatus)
         if status is None or math.isnan(status.pressure_pa):
             return NOTHING
-        return cell(f"{status.pressure_pa * 1e-5:.0f} bar" + ("" if status.floating else ", float air off"))
+        shown = f"{status.pressure_pa * 1e-5:.0f} bar"
+        if not status.floating:
+            return cell(f"{shown}, float air off")
+        lasts = None if self._left is None else self._left.steering
+        if lasts is None:
+            return cell(shown)
+        minutes = lasts.span_s / 60.0
+        level = Level.WARNING if minutes < FEW_MINUTES else Level.PLAIN
+        return cell(f"{shown}, {minutes:.0f} min left, ± {max(1.0, lasts.sigma_s / 60.0):.0f}", level)
 
 
 GAUGES = (

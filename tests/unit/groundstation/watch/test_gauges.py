@@ -153,6 +153,15 @@ def test_levels_say_what_is_bad(watched):
     assert cells["IMU"].pieces[1:] == (("  3 lost", Level.WARNING), ("  frozen", Level.BAD))
 
 
+def test_how_long_the_gas_lasts_is_shown_while_it_floats(watched):
+    for second in range(301):  # 0.1 bar a second afloat and steering evenly, from 100 bar on; empty at 30
+        watched.give(ValveStatus, second, floating=True, open_mask=0b11, pressure_pa=1e7 - 1e4 * second)
+        watched.look(second)
+    assert watched.cells()["tank"].text == "70 bar, 7 min left, ± 1"
+    watched.give(ValveStatus, 302, floating=False, pressure_pa=7e6)
+    assert watched.cells()["tank"].text == "70 bar, float air off"
+
+
 def test_where_it_can_stop_is_shown_while_it_flies(watched):
     watched.give(
         Outlook, 1, stopping_distance_m=0.123, time_to_edge_s=14.2, nearest="beta", nearest_room_m=0.4
