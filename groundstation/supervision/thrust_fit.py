@@ -140,12 +140,21 @@ class ThrustFit:
         self.gains[valve] = self._weak[valve] = self.gains[valve] * (1.0 - missing)
         self._gain_variances[valve] = WEAK_GAIN_SIGMA**2
 
+    @property
+    def weak(self) -> frozenset[int]:
+        """Valves that are known to be weak or closed."""
+        return frozenset(self._weak)
+
+    def take_healthy(self, valve: int) -> None:
+        """Take it that a valve which was weak may be healthy."""
+        del self._weak[valve]
+        self.gains[valve] = 1.0
+        self._gain_variances[valve] = self._config.gain_sigma**2
+
     def forget_weak(self) -> None:
         """Take it that all valves may be healthy."""
-        for valve in self._weak:
-            self.gains[valve] = 1.0
-            self._gain_variances[valve] = self._config.gain_sigma**2
-        self._weak.clear()
+        for valve in self.weak:
+            self.take_healthy(valve)
 
     @property
     def knows_zero(self) -> bool:

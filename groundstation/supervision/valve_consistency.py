@@ -202,13 +202,19 @@ class ValveConsistency:
             self._fit.learn(block, misfit)
 
     def _name(self, stamp_ns: int, verdict: Verdict) -> None:
-        """Believe it. What a weak or closed valve gives now is taken for known, and the watch goes on."""
+        """Believe it. What a weak or closed valve gives is taken for known, and the watch goes on."""
         best = verdict.best
         if verdict.is_hand:
             change_m_s = best.size * self._fit.sizes[best.valve] * self._config.block_s
             self._push(stamp_ns, change_m_s, "a force that is no valve's")
             return
         self._suspicions.drop()
+        if best.kind is Kind.WORKS:
+            whose = verdict.whose
+            self._fit.take_healthy(best.valve)
+            self._valve_findings = tuple(each for each in self._valve_findings if each.whose != whose)
+            self.health = {valve: health for valve, health in self.health.items() if valve != best.valve}
+            return
         self._valve_findings += verdict.findings()
         self.health = {**self.health, **verdict.health()}
         if best.kind in (Kind.WEAK, Kind.CLOSED):

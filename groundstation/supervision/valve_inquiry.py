@@ -44,6 +44,11 @@ class Verdict(NamedTuple):
     rivals: tuple[Explanation, ...]
     is_hand: bool
 
+    @property
+    def whose(self) -> str:
+        """The valve in words."""
+        return f"valve {self.best.valve}"
+
     def findings(self) -> tuple[Finding, ...]:
         """The fault in words; not for hands. What may as well be a valve that does not shut is said to be."""
         open_too = [

@@ -22,7 +22,7 @@ OPENS_CHANCE, STAYS_CHANCE = 0.02, 0.95
 """Of a valve which opens now and then: that it does so in a block, and that it is still open in the next."""
 CLOSED_SHARE = 0.75
 """Missing so much of its thrust, a valve is closed; else it is weak."""
-_MISSING, _ADDED = (0.4, 1.0), (0.1, 1.2)
+_MISSING, _ADDED, _AGAIN = (0.4, 1.0), (0.1, 1.2), (0.3, 1.2)
 _SUPPLY, _LATE_S = (0.4, 1.0), (-0.008, 0.008)
 
 
@@ -32,6 +32,7 @@ class Kind(Enum):
     CLOSED = "valve_stuck_closed"
     WEAK = "valve_weak"
     OPEN = "valve_stuck_open"
+    WORKS = "works again"
     SUPPLY = "supply pressure"
     TIMING = "delays other than the rig's"
 
@@ -101,9 +102,11 @@ class ValveTrial:
         self._witness = witness
         self._onsets = sorted(set(onsets))
         self._marks = frozenset(marks)
-        # columns: missing and added thrust of each valve, all together, late to open, late to close
+        # columns: of each valve thrust that is missing, not commanded, more than is known of it; then of all
+        # valves missing thrust, late opening, late closing
+        again = [_AGAIN if valve in fit.weak else (0.0, 0.0) for valve in range(count)]
         self._low, self._high = np.array(
-            [_MISSING] * count + [_ADDED] * count + [_SUPPLY, _LATE_S, _LATE_S]
+            [_MISSING] * count + [_ADDED] * count + again + [_SUPPLY, _LATE_S, _LATE_S]
         ).T
         shape = (len(self._onsets), len(self._low))
         self._force, self._squared, self._cross = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -152,12 +155,14 @@ class ValveTrial:
         for row, by_valve in enumerate((sx, sy, np.ones(count))):
             felt[row, :count] = -given * by_valve
             felt[row, count : 2 * count] = (1.0 - shares) * by_valve
-            felt[row, 2 * count :] = -given @ by_valve, -late @ by_valve, long @ by_valve
+            felt[row, 2 * count : 3 * count] = shares * by_valve
+            felt[row, 3 * count :] = -given @ by_valve, -late @ by_valve, long @ by_valve
         felt[2] = abs(felt[2])
         turned = np.empty(len(self._low))
         turned[:count] = -turning * st
         turned[count : 2 * count] = (1.0 - turns) * st
-        turned[2 * count :] = -turning @ st, -late @ st, long @ st
+        turned[2 * count : 3 * count] = turns * st
+        turned[3 * count :] = -turning @ st, -late @ st, long @ st
         return felt, turned
 
     def _open(self, block: Block, misfit: Misfit) -> None:
@@ -204,7 +209,7 @@ class ValveTrial:
             found.append(
                 Explanation(
                     self._kind(column, size),
-                    column % self._count if column < 2 * self._count else -1,
+                    column % self._count if column < 3 * self._count else -1,
                     float(likelihoods[slot, column]),
                     bool(is_twice[slot, column]),
                     size,
@@ -233,7 +238,9 @@ class ValveTrial:
             return Kind.CLOSED if size >= CLOSED_SHARE else Kind.WEAK
         if column < 2 * self._count:
             return Kind.OPEN
-        return Kind.SUPPLY if column == 2 * self._count else Kind.TIMING
+        if column < 3 * self._count:
+            return Kind.WORKS
+        return Kind.SUPPLY if column == 3 * self._count else Kind.TIMING
 
 
 def mixed(off: float, on: float, chance: float) -> tuple[float, float]:

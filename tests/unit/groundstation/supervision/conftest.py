@@ -38,7 +38,7 @@ class Truth:
     sag: float = 0.97
     zero: tuple[float, float] = (0.0, 0.0)
     closed: dict[int, float] = field(default_factory=dict)  # valve: from when
-    scale: dict[int, tuple[float, float]] = field(default_factory=dict)  # valve: from when, factor
+    scale: dict[int, tuple[float, ...]] = field(default_factory=dict)  # valve: from when, factor, until
     open: dict[int, tuple[float, float]] = field(default_factory=dict)  # valve: from when, share
     pulsing: dict[int, tuple[float, int, int]] = field(default_factory=dict)  # from when, on ms, period ms
     push: tuple[float, float, float, float] | None = None  # from, to, fx, fy (N, body)
@@ -113,8 +113,8 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None)
         if valve in truth.closed:
             share[grid >= truth.closed[valve]] = 0.0
         if valve in truth.scale:
-            since, factor = truth.scale[valve]
-            share[grid >= since] *= factor
+            since, factor, until = (*truth.scale[valve], math.inf)[:3]
+            share[(grid >= since) & (grid < until)] *= factor
         if valve in truth.open:
             since, least = truth.open[valve]
             share = np.where(grid >= since, np.maximum(share, least), share)

@@ -169,6 +169,47 @@ def test_weak_leaking_and_pulsing_valves_are_named(air, what, fault):
     assert right >= 10
 
 
+def test_what_a_weak_or_closed_valve_gives_is_known_from_then_on(air):
+    for fault, least, most in (
+        ({"scale": {3: (FAULT_MS, 0.3)}}, 0.2, 0.4),
+        ({"closed": {3: FAULT_MS}}, 0.0, 0.0),
+    ):
+        rng = np.random.default_rng(4)
+        truth, detector = air.Truth.drawn(rng, **fault), air.make_detector()
+        found = list(air.fly(detector, rng, truth, air.commands(rng, 300, truth), period_ms=10))
+        assert len(found) == 1  # what it does not give is no surprise any more
+        [(valve, health)] = detector.health.items()
+        assert valve == 3
+        assert least <= health.open_share <= most
+        assert health.shut_share == 0.0
+
+
+def test_a_weak_valve_that_works_again_is_cleared(air):
+    for seed in range(6):
+        rng = np.random.default_rng(20 + seed)
+        truth, detector = (
+            air.Truth.drawn(rng, scale={2: (FAULT_MS, 0.3, 2.5 * FAULT_MS)}),
+            air.make_detector(),
+        )
+        found = list(air.fly(detector, rng, truth, air.commands(rng, 400, truth), period_ms=10))
+        assert [[each.id for each in findings] for _, findings in found] == [["valve_weak"], []]
+        assert found[1][0] > 2.5 * FAULT_S
+        assert detector.health == {}
+
+
+def test_a_second_valve_is_found_beside_one_that_stays_closed(air):
+    named = 0
+    for seed in range(6):
+        rng = np.random.default_rng(40 + seed)
+        truth = air.Truth.drawn(rng, closed={1: FAULT_MS}, open={6: (2.5 * FAULT_MS, 1.0)})
+        found = list(air.fly(air.make_detector(), rng, truth, air.commands(rng, 400, truth), period_ms=10))
+        last = {each.id: each.detail for each in found[-1][1]}
+        named += last.keys() == {"valve_stuck_closed", "valve_stuck_open"} and (
+            "valve 6 " in last["valve_stuck_open"]
+        )
+    assert named >= 5
+
+
 def test_a_shock_is_a_push_and_no_valve_and_is_forgotten_after_two_seconds(air):
     for seed in range(6):
         rng = np.random.default_rng(seed)
