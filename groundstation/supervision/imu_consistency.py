@@ -55,6 +55,8 @@ class ImuConsistencyConfig:
 
 _BELIEVED_SIGMAS = 3.0
 """One fix proves nothing, however far off: it may be wrong."""
+SPIN_RAD_S, SPUN_NS = 0.6, 20_000_000_000
+"""In a faster spin scale and zero cannot be told apart, nor before the estimate has unlearned it."""
 _LONGEST_GAP_S = 2.0
 _LARGEST_STEP_RAD_S = 0.2
 """A turn that a larger step would take is a wrong fix; after three of them in a row the one before was."""
@@ -99,6 +101,7 @@ class ImuConsistency:
         self._turns: list[tuple[int, float]] = []  # stamp, turn since the start by the gyro
         self._headings: dict[str, Heading] = {}
         self._zeros: list[tuple[int, float]] = []
+        self._spun_ns: int | None = None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -112,6 +115,8 @@ class ImuConsistency:
             stamp_ns: End of its window.
             rate_rad_s: Rate, the estimator's zero removed.
         """
+        if abs(rate_rad_s) > SPIN_RAD_S:
+            self._spun_ns = stamp_ns
         if self._turns:
             span_s = (stamp_ns - self._turns[-1][0]) * 1e-9
             if not 0.0 < span_s < 0.1:
@@ -133,7 +138,8 @@ class ImuConsistency:
             stamp_sigma_s: Of its exposure, as it states; what `config` states adds to it.
         """
         turned = self._turned_at(stamp_ns)
-        if turned is None:
+        if turned is None or self._spins(stamp_ns):
+            self._headings.pop(source, None)
             return
         heading = self._headings.get(source)
         if heading is None or not 0.0 < (span_s := (stamp_ns - heading.stamp_ns) * 1e-9) < _LONGEST_GAP_S:
@@ -214,19 +220,25 @@ class ImuConsistency:
     def zero(self, now_ns: int, rate_rad_s: float) -> None:
         """Take the zero of the gyro that the estimator subtracts.
 
-        Waves of the table move what it takes for those of the accelerometers: they are not judged here.
+        Waves of the table move what it takes for those of the accelerometers: they are not judged here. Nor
+        is the gyro's after a spin, whose scale it has learned for a zero.
 
         Args:
             now_ns: When it stated it.
             rate_rad_s: The zero.
         """
         config = self._config
+        if self._spins(now_ns):
+            self._zeros.clear()
         self._zeros.append((now_ns, rate_rad_s))
         while now_ns - self._zeros[0][0] > config.drift_s * 1e9:
             self._zeros.pop(0)
         turned = abs(rate_rad_s - self._zeros[0][1])
         if turned > config.zero_drift_rad_s:
             self._find("imu_shifted", f"the gyro's zero moved by {math.degrees(turned):.2f} deg/s")
+
+    def _spins(self, now_ns: int) -> bool:
+        return self._spun_ns is not None and now_ns - self._spun_ns < SPUN_NS
 
     def _turned_at(self, stamp_ns: int) -> float | None:
         """Turn by the gyro up to a moment; None where samples do not reach."""

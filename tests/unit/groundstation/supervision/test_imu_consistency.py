@@ -182,3 +182,21 @@ def test_estimated_zeros_that_walk_are_usual_and_that_run_are_not():
     checks.zero(5 * 3600 * 200_000_000, gyro + 0.006)
     assert checks.findings[0].id == "imu_shifted"
     assert "deg/s" in checks.findings[0].detail
+
+
+@pytest.mark.parametrize(("rate_rad_s", "is_found"), [(0.0, True), (0.59, True), (0.61, False)])
+def test_in_a_spin_and_for_a_while_after_scale_and_zero_are_not_told_apart(rate_rad_s, is_found):
+    checks = ImuConsistency(ImuConsistencyConfig(gyro_density_rad_s_rthz=6.7e-5, heading_sigma_rad=1e-3))
+    for step in range(100):
+        now_ns = step * 100_000_000
+        checks.sample(now_ns, rate_rad_s if step < 20 else 0.0)
+        checks.zero(now_ns, 7e-3 * min(1.0, step / 30))
+    assert bool(checks.findings) is is_found
+
+
+def test_a_shift_long_after_a_spin_is_found():
+    checks = ImuConsistency(ImuConsistencyConfig(gyro_density_rad_s_rthz=6.7e-5, heading_sigma_rad=1e-3))
+    checks.sample(0, 1.0)
+    for step in range(300):
+        checks.zero(step * 100_000_000, 0.0 if step < 260 else 7e-3)
+    assert checks.findings
