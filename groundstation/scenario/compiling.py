@@ -109,6 +109,12 @@ def _waiting(rig: Rig) -> Changes:
 
 def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
     changes: Changes = {}
+    if file.obstacles:  # the safety filter keeps out of them, too
+        rigs = [section.model_dump() for section in rig.table.keep_out]
+        own = [
+            {"name": f"obstacle_{number}", **each.model_dump()} for number, each in enumerate(file.obstacles)
+        ]
+        changes["table.keep_out"] = rigs + own
     for key, value in file.changes.items():
         if not (is_hardware and key.startswith("laboratory.")):
             changes[key] = value

@@ -65,7 +65,7 @@ def _verdict(
         log.events(),
         zero_s,
         scenario.name,
-        tuple((each.x_m, each.y_m, each.radius_m) for each in scenario.file.obstacles),
+        tuple((each.x_m, each.y_m, each.radius_m) for each in scenario.rig.table.keep_out),
     )
 
 

@@ -61,7 +61,7 @@ def nothing_flown(file: ScenarioFile, rig: Rig) -> RunTracks:
         {},
         (),
         bounds_of(rig),
-        tuple((each.x_m, each.y_m, each.radius_m) for each in file.obstacles),
+        tuple((each.x_m, each.y_m, each.radius_m) for each in rig.table.keep_out),
         {name: rig.type_of(name).valves.thrust_n for name in rig.vehicles},
         dict(_keeps(rig)),
         file.duration_s,

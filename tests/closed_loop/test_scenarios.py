@@ -113,6 +113,29 @@ def test_a_vehicle_that_comes_down_fails_the_run_unless_it_may_land(file):
     assert scenario.run(scenario.load(file(text))).passed
 
 
+def test_who_is_sent_through_an_obstacle_stops_before_it(file):
+    """The straight way leads through it: the safety filter keeps out, and finds no way around."""
+    way = """
+[[obstacles]]
+x_m = 0.0
+y_m = 0.6
+radius_m = 0.1
+[[timeline]]
+at_s = 1.0
+vehicle = "alpha"
+request = "go_to"
+arguments = { x_m = 0.6, y_m = 1.2, heading_deg = 0.0 }
+[[limits]]
+what = "least_obstacle_mm"
+vehicle = "alpha"
+above = 5.0
+"""
+    flown = scenario.run(scenario.load(file(SHORT.replace("duration_s = 6.0", "duration_s = 30.0") + way)))
+    assert flown.passed, flown.reason
+    assert flown["alpha.least_obstacle_mm"] < 100.0  # it came near
+    assert flown["alpha.contacts"] == 0
+
+
 def test_another_answer_than_expected_fails_the_run_with_the_reason(file):
     row = (
         '\n[[timeline]]\nat_s = 1.0\nvehicle = "alpha"\nrequest = "go_to"\n'
