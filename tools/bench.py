@@ -25,6 +25,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import cv2  # noqa: E402
 from bench import (  # noqa: E402
     campaign,
+    crowd,
     deaths,
     fault_flights,
     fresh_clone,
@@ -67,6 +68,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "deaths": deaths.measure,
         "live_faults": live_faults.measure,
         "outage": outage.measure,
+        "crowd": crowd.measure,
         "fault_flights": fault_flights.measure,
         "hostile_commands": hostile_commands.measure,
         "house": house.measure,
@@ -98,6 +100,7 @@ FOLDERS = {"star_folder": "ceiling.csv", "fusion_folder": "**/imu.csv"}
 ON_REQUEST = frozenset(
     {
         "campaign",
+        "crowd",
         "fresh_clone",
         "fault_flights",
         "hostile_commands",

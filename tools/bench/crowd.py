@@ -1,4 +1,4 @@
-"""How many mock-ups fly in closed loop in real time on this machine: live, recorded, no fault, no state missing.
+"""How many mock-ups fly in closed loop in real time here: live, recorded, no fault, no state missing.
 
 One more at a time until it fails; the largest number that flew counts. Rendered: each has a camera of 10
 frames a second whose pictures are rendered, found and solved. Drawn: fixes come from the laboratory.
