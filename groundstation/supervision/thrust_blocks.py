@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from groundstation.control.sag import sag_factor
 from groundstation.control.valve_push import ValvePush
 from groundstation.control.vehicle import VehicleModel
 
@@ -23,6 +24,9 @@ class Block:
         rate_shares: The same as the gyro feels it.
         ends: Of each valve, how many ends of thrust lie in the block (a part counts as a part).
         edges: Of each valve, starts and ends.
+        sagged_shares: As `open_shares`, less what the supply's sag takes.
+        crowds: How much those grow with the sag's factor.
+        turned_s: Of each valve, thrust since the block's start as the gyro feels it, mean over the block.
         is_after_gap: Whether samples are missing before it.
     """
 
@@ -33,6 +37,9 @@ class Block:
     rate_shares: list[float]
     ends: list[float]
     edges: list[float]
+    sagged_shares: list[float]
+    crowds: list[float]
+    turned_s: list[float]
     is_after_gap: bool
 
 
@@ -47,6 +54,9 @@ class _Sums:
     rate_shares: list[float]
     ends: list[float]
     edges: list[float]
+    sagged: list[float]
+    crowds: list[float]
+    moments: list[float]
 
 
 class _Lag:
@@ -80,6 +90,7 @@ class ThrustBlocks:
         rise_s: Time constant of the thrust.
         lags_s: Of the accelerometers' and of the gyro's low-pass.
         block_s: Length of a block.
+        sag: Factor of thrust per further open valve.
     """
 
     def __init__(
@@ -89,7 +100,9 @@ class ThrustBlocks:
         rise_s: float,
         lags_s: tuple[float, float],
         block_s: float,
+        sag: float = 1.0,
     ) -> None:
+        self._sag = sag
         self._model, self._delays_s, self._block_s = model, delays_s, block_s
         self._count = len(model.valves)
         self._rise_s, (self._acc_lag_s, self._gyro_lag_s) = rise_s, lags_s
@@ -145,6 +158,7 @@ class ThrustBlocks:
         if not targets and not self._live:
             return
         span_s = (stop_ns - start_ns) * 1e-9
+        felt_all: list[tuple[int, float]] = []
         for valve in self._live.union(targets):
             acc = self._acc[valve]
             before = acc.value
@@ -156,16 +170,25 @@ class ThrustBlocks:
                 sums.open_shares[valve] += span_s * felt
                 sums.rate_shares[valve] += span_s * turned
                 sums.edges[valve] += abs(change)
+                sums.moments[valve] += span_s * turned * (sums.span_s - 0.5 * span_s)
+                felt_all.append((valve, felt))
                 if change < 0.0:
                     sums.ends[valve] -= change
             if valve in targets or acc.value > _NO_THRUST or self._rise[valve].value > _NO_THRUST:
                 self._live.add(valve)
             else:
                 self._live.discard(valve)
+        if sums is not None:
+            crowd = sum(felt for _, felt in felt_all)
+            factor = sag_factor(crowd, self._sag)
+            growth = max(0.0, crowd - 1.0) * factor / self._sag
+            for valve, felt in felt_all:
+                sums.sagged[valve] += span_s * felt * factor
+                sums.crowds[valve] += span_s * felt * growth
 
     def _empty(self, *, is_after_gap: bool) -> _Sums:
-        zeros = [0.0] * self._count
-        return _Sums(0.0, 0.0, 0.0, 0.0, is_after_gap, zeros, zeros.copy(), zeros.copy(), zeros.copy())
+        lists = ([0.0] * self._count for _ in range(7))
+        return _Sums(0.0, 0.0, 0.0, 0.0, is_after_gap, *lists)
 
 
 def _block(sums: _Sums) -> Block:
@@ -178,5 +201,8 @@ def _block(sums: _Sums) -> Block:
         [share / span_s for share in sums.rate_shares],
         sums.ends,
         sums.edges,
+        [share / span_s for share in sums.sagged],
+        [crowd / span_s for crowd in sums.crowds],
+        [turned - moment / span_s for turned, moment in zip(sums.rate_shares, sums.moments, strict=True)],
         sums.is_after_gap,
     )

@@ -32,8 +32,8 @@ class Truth:
     mass: float = 1.0
     inertia: float = 1.0
     centre_m: tuple[float, float] = (0.0, 0.0)
-    open_ms: float = 6.0
-    close_ms: float = 5.0
+    open_ms: float | np.ndarray = 6.0  # one for all valves, or of each
+    close_ms: float | np.ndarray = 5.0
     rise_ms: float = 4.0
     sag: float = 0.97
     zero: tuple[float, float] = (0.0, 0.0)
@@ -97,15 +97,16 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None)
     felt = np.zeros((steps, 8))
     start = np.arange(chosen.shape[0]) * PERIOD_MS
     grid = np.arange(steps)
+    open_ms, close_ms = np.broadcast_to(truth.open_ms, 8), np.broadcast_to(truth.close_ms, 8)
     for valve in range(8):
         on = chosen[:, valve]
         share = np.zeros(steps + 300)
         for first, length in zip(start[on > 0], on[on > 0], strict=True):
             is_open = first and share[first + 1] > 0
-            begin = first + (0.0 if is_open else truth.open_ms + rng.normal(0.0, 0.5))
-            end = first + length + truth.close_ms
+            begin = first + (0.0 if is_open else open_ms[valve] + rng.normal(0.0, 0.5))
+            end = first + length + close_ms[valve]
             low, high = math.floor(begin), math.floor(end)
-            share[first + math.ceil(truth.close_ms) :] = 0.0
+            share[first + math.ceil(close_ms[valve]) :] = 0.0
             share[low + 1 : high] = 1.0
             share[low] = max(share[low], 1 - begin + low)
             share[high] = end - high
