@@ -58,9 +58,12 @@ class Verdict(NamedTuple):
         return (found, *(self._finding(each, (self.best,)) for each in open_too[:1]))
 
     def health(self) -> dict[int, ValveHealth]:
-        """What the valve gives now, by its number; of those that cannot be told apart nothing is known."""
+        """What the valve gives now, by its number.
+
+        Nothing is known of those that cannot be told apart, nor of one that opens now and then.
+        """
         best = self.best
-        if best.valve < 0 or self.rivals:
+        if best.valve < 0 or self.rivals or not best.is_steady:
             return {}
         if best.kind is Kind.OPEN:
             share = min(best.size, MOST_SHARE)

@@ -51,6 +51,7 @@ class Explanation(NamedTuple):
         by_rate: What the gyro gave.
         across: Size of what is left across its direction over what is along it.
         across_sigma: One sigma of that.
+        is_steady: It lasts; a valve that opens now and then gives its thrust for a while only.
     """
 
     kind: Kind
@@ -63,6 +64,7 @@ class Explanation(NamedTuple):
     by_rate: float
     across: float
     across_sigma: float
+    is_steady: bool = True
 
 
 @dataclass(slots=True)
@@ -228,7 +230,11 @@ class ValveTrial:
             alike = found[self._count + valve]  # direction and turning of thrust not commanded
             found.append(
                 alike._replace(
-                    likelihood=opening.likelihood, is_twice=twice, size=1.0, thrust_s=opening.thrust_s
+                    likelihood=opening.likelihood,
+                    is_twice=twice,
+                    size=1.0,
+                    thrust_s=opening.thrust_s,
+                    is_steady=False,
                 )
             )
         return sorted(found, key=lambda each: -each.likelihood)

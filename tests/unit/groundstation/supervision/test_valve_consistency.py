@@ -184,6 +184,28 @@ def test_what_a_weak_or_closed_valve_gives_is_known_from_then_on(air):
         assert health.shut_share == 0.0
 
 
+@pytest.mark.parametrize(
+    ("fault", "health"),
+    [
+        ({"open": {5: (FAULT_MS, 1.0)}}, (0.9, 1.2, 0.9, 1.2)),
+        ({"open": {5: (FAULT_MS, 0.4)}}, (1.0, 1.0, 0.3, 0.5)),
+        ({"pulsing": {5: (FAULT_MS, 40, 400)}}, None),
+    ],
+)
+def test_what_a_valve_that_does_not_shut_gives_is_planned_with_unless_it_comes_and_goes(air, fault, health):
+    rng = np.random.default_rng(9)
+    truth, detector = air.Truth.drawn(rng, **fault), air.make_detector()
+    found = list(air.fly(detector, rng, truth, air.commands(rng, 200, truth), period_ms=10))
+    assert [each.id for each in found[0][1]] == ["valve_stuck_open"]
+    if health is None:
+        assert detector.health == {}
+        return
+    [(valve, given)] = detector.health.items()
+    assert valve == 5
+    assert health[0] <= given.open_share <= health[1]
+    assert health[2] <= given.shut_share <= health[3]
+
+
 def test_a_weak_valve_that_works_again_is_cleared(air):
     for seed in range(6):
         rng = np.random.default_rng(20 + seed)
