@@ -50,7 +50,7 @@ def test_a_short_way_has_no_cruise():
 
 
 def test_fewer_places_than_ships_are_refused_in_a_sentence():
-    with pytest.raises(ValueError, match="^2 ships need as many places, found 1: give more places$"):
+    with pytest.raises(ValueError, match=r"^2 ships need as many places, found 1: give more places$"):
         assign({"alpha": (0.0, 0.0), "beta": (1.0, 0.0)}, [(0.0, 0.0)])
 
 
