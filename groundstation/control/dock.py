@@ -1,7 +1,7 @@
 """Docking: along the corridor of another mock-up's port to a soft first contact.
 
 Go round to the gate before the port, wait there until it is calm, come in along the axis as it turns, slower
-and slower, and press on until it has touched (W. Fehse, Automated Rendezvous and Docking of Spacecraft, 2003,
+and slower, until it bounces off (W. Fehse, Automated Rendezvous and Docking of Spacecraft, 2003,
 chapters 4 and 5: hold point, straight-line approach in a corridor, abort to the hold point). Who leaves the
 corridor, comes in too fast or loses sight of the target backs out along the axis and tries again.
 """
@@ -28,6 +28,7 @@ _IN_LINE_RAD = math.radians(15.0)
 _CALM_M, _CALM_M_S, _CALM_RAD, _CALM_S = 0.012, 0.008, math.radians(2.0), 3.0
 _SMOOTHING_S = 1.0  # of the target's velocity and rate: it is no manoeuvring target
 _BERTH_M = 0.03  # from contact, where it stays afterwards
+_TOUCHED_M = 0.004  # who parts from nearer than this has touched: estimates are off by a millimetre or two
 _BACK_M_S2 = 0.004
 _LAG_M = 0.02  # so far behind its reference it waits
 
@@ -55,7 +56,7 @@ class DockConfig(BaseModel):
         approach_m_s: Largest closing speed.
         contact_m_s: Closing speed at contact.
         slowing_m_s2: Deceleration between both.
-        press_m: So far beyond contact it presses on before it has surely touched.
+        press_m: So far beyond contact it presses on where no bounce was seen.
         go_to: How to get to the gate.
     """
 
@@ -71,7 +72,7 @@ class DockConfig(BaseModel):
     approach_m_s: float = Field(default=0.03, gt=0.0, le=0.2)
     contact_m_s: float = Field(default=0.006, gt=0.0, le=0.05)
     slowing_m_s2: float = Field(default=0.002, gt=0.0, le=0.1)
-    press_m: float = Field(default=0.012, ge=0.0, le=0.05)
+    press_m: float = Field(default=0.008, ge=0.0, le=0.05)
     go_to: GoToConfig = GoToConfig(speed_m_s=0.08)
 
     def corridor(self) -> Corridor:
@@ -190,8 +191,9 @@ class Dock:
             if self._calm_s >= _CALM_S:
                 self._phase, self._along_m, self._speed_m_s = Phase.IN, at.along_m, 0.0
         elif self._phase is Phase.IN:
-            if self._along_m <= config.contact_m - config.press_m:
-                self._phase = Phase.DOCKED
+            has_bounced = at.closing_m_s < 0.0 and at.along_m < config.contact_m + _TOUCHED_M
+            if has_bounced or self._along_m <= config.contact_m - config.press_m:
+                self._phase = Phase.DOCKED  # to press on would slide one hull along the other
             elif corridor.objection(state, target):
                 self._phase, self._speed_m_s = Phase.BACK, 0.0
                 self._along_m = max(at.along_m, config.contact_m)

@@ -175,6 +175,18 @@ def test_who_loses_sight_of_the_target_stops_and_backs_out():
     flight.fly(Phase.DOCKED)
 
 
+def test_who_bounces_off_has_touched_and_presses_no_more():
+    flight = Approach((0.0, 1.2))
+    flight.fly(Phase.IN)
+    while math.hypot(*flight.ship.position_table_m) > 0.402:
+        flight.step()
+    assert flight.law.phase is Phase.IN
+    (x, y), (vx, vy) = flight.ship.position_table_m, flight.ship.velocity_table_m_s
+    flight.ship = ControlState((x, y), (-vx / 2, -vy / 2), flight.ship.heading_rad, flight.ship.rate_rad_s)
+    flight.step()
+    assert flight.law.phase is Phase.DOCKED
+
+
 def test_after_contact_it_stands_off():
     flight = Approach((0.0, 1.2))
     flight.fly(Phase.DOCKED)
