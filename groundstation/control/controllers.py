@@ -14,12 +14,17 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel
 
 from groundstation.control.controller import Controller
+from groundstation.control.corridor import Corridor
+from groundstation.control.dock import Dock, DockConfig
 from groundstation.control.follow import Follow, FollowConfig
 from groundstation.control.formation import Formation, FormationConfig
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.path import PathConfig, PathFollowing
+from groundstation.control.state import Vector2
 from groundstation.control.station import StationConfig, StationKeeping
+from groundstation.control.trajectory import Trajectory, TrajectoryConfig
+from groundstation.control.turn import Turn, TurnConfig
 from groundstation.control.vehicle import VehicleModel
 
 ENTRY_POINT_GROUP = "groundstation.controllers"
@@ -35,6 +40,20 @@ def _nobody(config: BaseModel) -> tuple[str, ...]:
     return ()
 
 
+def _with_nobody(config: BaseModel) -> tuple[str, Corridor] | None:
+    del config
+    return None
+
+
+Obstacles = tuple[tuple[float, float, float], ...]
+"""x, y, radius (m) of each."""
+
+
+def _nothing(vehicle: str, fleet_m: Mapping[str, Vector2], obstacles_m: Obstacles) -> Mapping[str, Any]:
+    del vehicle, fleet_m, obstacles_m
+    return {}
+
+
 @dataclass(frozen=True, slots=True)
 class ControllerRow(Generic[ConfigT]):
     """One controller.
@@ -45,6 +64,9 @@ class ControllerRow(Generic[ConfigT]):
         make: Builds one for a vehicle.
         example: Parameters that the contract tests run it with.
         neighbours: Other vehicles whose states it wants, by its parameters.
+        of_rig: Parameters that the rig states already, from its name, the places to hold of all that
+            fly this law, and the places to keep out of; the file's own go before them.
+        docks_with: Whom it may touch and in which corridor, by its parameters; None where nobody.
         has_program: It knows by itself where to go; a goal interrupts it until it is resumed.
         is_built_in: It is of the tree; others run in a process of their own.
     """
@@ -54,6 +76,8 @@ class ControllerRow(Generic[ConfigT]):
     make: Callable[[ConfigT, VehicleModel, KeepIn | None], Controller]
     example: Mapping[str, Any] = field(default_factory=dict)
     neighbours: Callable[[ConfigT], tuple[str, ...]] = _nobody
+    of_rig: Callable[[str, Mapping[str, Vector2], Obstacles], Mapping[str, Any]] = _nothing
+    docks_with: Callable[[ConfigT], tuple[str, Corridor] | None] = _with_nobody
     has_program: bool = False
     is_built_in: bool = False
 
@@ -96,6 +120,38 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             Follow,
             {"leader": "leader", "distance_m": 0.8},
             lambda config: (config.leader,),
+            has_program=True,
+        ),
+        "trajectory": ControllerRow(
+            "reconfigure: fly the own part of a plan on which nobody meets",
+            TrajectoryConfig,
+            Trajectory,
+            {
+                "ship": "own",
+                "starts_m": {"own": (0.0, 0.0), "leader": (1.2, 0.0)},
+                "places_m": ((1.2, 0.0), (0.0, 0.0)),
+            },
+            lambda config: tuple(name for name in config.starts_m if name != config.ship),
+            lambda vehicle, fleet_m, obstacles_m: {
+                "ship": vehicle,
+                "starts_m": fleet_m,
+                "obstacles_m": obstacles_m,
+            },
+            has_program=True,
+        ),
+        "dock": ControllerRow(
+            "come in along the corridor of another mock-up's port to a soft contact",
+            DockConfig,
+            Dock,
+            {"target": "leader"},
+            lambda config: (config.target,),
+            docks_with=lambda config: (config.target, config.corridor()),
+            has_program=True,
+        ),
+        "turn": ControllerRow(
+            "hold a place and turn at a constant rate",
+            TurnConfig,
+            Turn,
             has_program=True,
         ),
     }

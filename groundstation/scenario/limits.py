@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 from groundstation.control.follow import FollowConfig
 from groundstation.declarations.rig import Rig
-from groundstation.parts.control.sections import control_of
+from groundstation.parts.control.sections import control_of, dockings_of
 from groundstation.parts.scenario.part import bounds_of
 from groundstation.scenario.key_trouble import KeyTroubleError
 from groundstation.scenario.quantities import QUANTITIES
-from groundstation.scenario.run_tracks import Keeps, RunTracks
+from groundstation.scenario.run_tracks import Docks, Keeps, RunTracks
 from groundstation.scenario.scenario_file import Limit, ScenarioFile
 from groundstation.scenario.timeline import Groups, members
 
@@ -65,6 +65,10 @@ def nothing_flown(file: ScenarioFile, rig: Rig) -> RunTracks:
         {name: rig.type_of(name).valves.thrust_n for name in rig.vehicles},
         dict(_keeps(rig)),
         file.duration_s,
+        {
+            ship: Docks(target, corridor.axis_rad, corridor.contact_m)
+            for ship, target, corridor in dockings_of(rig)
+        },
     )
 
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from groundstation.scenario import clearances, deviations
+from groundstation.scenario import clearances, deviations, first_contact
 from groundstation.scenario.flight_log import within
 from groundstation.scenario.run_tracks import RunTracks, Span, Value
 
@@ -40,6 +40,10 @@ def _follows(flown: RunTracks, vehicle: str) -> bool:
 def _has_obstacles(flown: RunTracks, vehicle: str) -> bool:
     del vehicle
     return bool(flown.obstacles)
+
+
+def _docks(flown: RunTracks, vehicle: str) -> bool:
+    return vehicle in flown.docks
 
 
 def _faces(flown: RunTracks, vehicle: str) -> bool:
@@ -87,6 +91,12 @@ QUANTITIES: Mapping[str, Quantity] = {
         "between two hulls", clearances.least_distance_mm, is_of_pair=True, least=-math.inf
     ),
     "contacts": Quantity("a hull touches an edge, an obstacle or another hull", clearances.contacts),
+    "contact_speed_mm_s": Quantity(
+        "of the first contact of a docking", first_contact.contact_speed_mm_s, applies=_docks
+    ),
+    "contact_lateral_mm": Quantity(
+        "of the first contact, from the port's axis", first_contact.contact_lateral_mm, applies=_docks
+    ),
     "estimate_error_rms_mm": Quantity("of the position, by truth", deviations.estimate_error_rms_mm),
     "estimate_error_max_mm": Quantity("of the position, by truth", deviations.estimate_error_max_mm),
     "faults": Quantity("faults found", _faults),

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,6 +26,21 @@ class Keeps:
     faces: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Docks:
+    """Whom a vehicle docks with.
+
+    Attributes:
+        target: Of whom.
+        axis_rad: Of the port in the target's body.
+        contact_m: Between the origins of the bodies at contact.
+    """
+
+    target: str
+    axis_rad: float
+    contact_m: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RunTracks:
     """A run as quantities see it.
@@ -37,6 +52,7 @@ class RunTracks:
         obstacles: x, y, radius (m) of each.
         thrust_n: Nominal thrust of a valve, by vehicle.
         keeps: What followers are to keep, by vehicle.
+        docks: Whom vehicles dock with, by vehicle.
         duration_s: From t = 0 to the end.
     """
 
@@ -47,6 +63,7 @@ class RunTracks:
     thrust_n: Mapping[str, float]
     keeps: Mapping[str, Keeps]
     duration_s: float
+    docks: Mapping[str, Docks] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

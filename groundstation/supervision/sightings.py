@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from groundstation.control.corridor import Docking, may_touch
 from groundstation.control.edge import EdgeVerdict, edge_outlook
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import ControlState
@@ -94,6 +95,8 @@ class Sightings:
         own: The newest estimate; None before the first.
         others: Those of the other vehicles.
         leaders: Names of vehicles whose states its controller wants.
+        name: Of this vehicle.
+        dockings: Pairs of the rig that may touch, each inside its corridor.
         node: The newest status of its valve node; None before the first.
         findings: What the fault detector found, by id with details.
         findings_ns: Arrival of these.
@@ -118,6 +121,8 @@ class Sightings:
     own: Seen | None = None
     others: dict[str, Seen] = field(default_factory=dict)
     leaders: tuple[str, ...] = ()
+    name: str = ""
+    dockings: tuple[Docking, ...] = ()
     node: NodeSeen | None = None
     findings: Mapping[str, str] = field(default_factory=dict)
     findings_ns: int | None = None
@@ -246,7 +251,7 @@ class Sightings:
             return
         first = clearance(
             own.state,
-            self.others_here(now_ns),
+            self._to_keep_from(own.state, now_ns),
             self.braking_m_s2,
             reaction_s=REACTION_S,
             radius_m=self.radius_m,
@@ -255,6 +260,12 @@ class Sightings:
             yield "vehicle_unavoidable", f"{first.name}: they would overlap by {-1e3 * first.room_m:.0f} mm"
         elif first.verdict is EdgeVerdict.BRAKE:
             yield "vehicle_ahead", f"{first.name}: {1e3 * first.room_m:.0f} mm would be left"
+
+    def _to_keep_from(self, own: ControlState, now_ns: int) -> dict[str, ControlState]:
+        """The other vehicles, but for who docks here and is inside its corridor."""
+        others = self.others_here(now_ns)
+        exempt = may_touch(self.name, self.dockings, {**others, self.name: own})
+        return {name: state for name, state in others.items() if name not in exempt}
 
     def _estimate(self) -> Iterator[tuple[str, str]]:
         own = self.own

@@ -17,7 +17,13 @@ from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.controller_node import ControllerNode
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
-from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of, neighbours_of
+from groundstation.parts.control.sections import (
+    ControlOfType,
+    ControlOfVehicle,
+    config_of,
+    control_of,
+    neighbours_of,
+)
 from groundstation.supervision.apart import in_the_way, too_near
 
 HOLDING = "go_to"
@@ -47,7 +53,7 @@ def controller_node(rig: Rig, vehicle: str, law: Controller | None = None) -> Co
     """
     section, hold = control_of(rig, vehicle)[0], rig.vehicles[vehicle].hold
     row, keep_in = _row(rig, vehicle), rig.table.keep_in()
-    config = row.config.model_validate(section.parameters)
+    config = config_of(rig, vehicle)
     model = rig.type_of(vehicle).model()
     has_program = row.has_program and law is None
     return ControllerNode(
@@ -75,7 +81,7 @@ def _check(rig: Rig) -> None:
         _check_name(section.controller, key)
         row = controllers()[section.controller]
         try:
-            config = row.config.model_validate(section.parameters)
+            config = config_of(rig, name)
         except ValidationError as error:
             raise ValueError(f"{key}.parameters.{_first(error)}") from error
         for neighbour in row.neighbours(config):

@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from groundstation.control.controllers import controllers
+from groundstation.control.corridor import Docking
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Section
 
@@ -41,8 +42,36 @@ def control_of(rig: Rig, vehicle: str) -> tuple[ControlSection, str]:
     return rig.of_type(vehicle, ControlOfType).control, f"mock_ups.{rig.vehicles[vehicle].mock_up}.control"
 
 
-def neighbours_of(rig: Rig, vehicle: str) -> tuple[str, ...]:
-    """Other vehicles whose states the controller of a vehicle wants."""
+def config_of(rig: Rig, vehicle: str) -> BaseModel:
+    """The checked parameters of a vehicle's controller, with what the rig states already.
+
+    Raises:
+        pydantic.ValidationError: A parameter is unknown, missing or out of range.
+    """
     section = control_of(rig, vehicle)[0]
     row = controllers()[section.controller]
-    return tuple(row.neighbours(row.config.model_validate(section.parameters)))
+    fleet_m = {
+        name: (keys.hold.x_m, keys.hold.y_m)
+        for name, keys in rig.vehicles.items()
+        if control_of(rig, name)[0].controller == section.controller
+    }
+    obstacles_m = tuple((*each.position_table_m, each.radius_m) for each in rig.table.obstacles())
+    stated = row.of_rig(vehicle, fleet_m, obstacles_m)
+    config: BaseModel = row.config.model_validate({**stated, **section.parameters})
+    return config
+
+
+def neighbours_of(rig: Rig, vehicle: str) -> tuple[str, ...]:
+    """Other vehicles whose states the controller of a vehicle wants."""
+    row = controllers()[control_of(rig, vehicle)[0].controller]
+    return tuple(row.neighbours(config_of(rig, vehicle)))
+
+
+def dockings_of(rig: Rig) -> tuple[Docking, ...]:
+    """Pairs that may touch, each inside its corridor."""
+    found = []
+    for name in rig.vehicles:
+        docks_with = controllers()[control_of(rig, name)[0].controller].docks_with(config_of(rig, name))
+        if docks_with is not None:
+            found.append(Docking(name, *docks_with))
+    return tuple(found)

@@ -8,7 +8,7 @@ from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, STATION_CHANNEL, Rig
 from groundstation.fusion.hold_up import HoldUp
 from groundstation.fusion.noise import lag_of_bandwidth
-from groundstation.parts.control.sections import neighbours_of
+from groundstation.parts.control.sections import dockings_of, neighbours_of
 from groundstation.parts.fusion.sections import FusionOfType, fused_sources
 from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.sections import StarsOfType
@@ -48,6 +48,8 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
         began_ns=0,
         most_frames_hz=2.0 * NODE_FRAMES_HZ * len(rig.vehicles) + SPARE_FRAMES_HZ,
         leaders=neighbours_of(rig, vehicle),
+        name=vehicle,
+        dockings=dockings_of(rig),
     )
     supervisor = Supervisor(
         sightings,

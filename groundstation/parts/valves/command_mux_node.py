@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from groundstation.control.braking import Braking
+from groundstation.control.corridor import Docking, may_touch
 from groundstation.control.edge import braking_to_count_on, edge_outlook
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux, Selection, Source
@@ -45,6 +46,7 @@ class CommandMuxNode(Node):
         surroundings: Obstacles, and where the others are.
         model: Mass properties.
         modulator: Makes pulses.
+        dockings: Pairs that may touch, each inside its corridor.
     """
 
     inputs = (Wrench, VehicleState, Supervision, ValveShares, Request, Lease)
@@ -62,6 +64,7 @@ class CommandMuxNode(Node):
         surroundings: Surroundings,
         model: VehicleModel,
         modulator: PulseModulator,
+        dockings: tuple[Docking, ...] = (),
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._others = others
@@ -69,6 +72,7 @@ class CommandMuxNode(Node):
         self._surroundings = surroundings
         self._model = model
         self._modulator = modulator
+        self._dockings = dockings
         self._period_ns = round(modulator.config.period_s * 1e9)
         self._due_ns = 0
         self._hand = HandPush(self._period_ns)
@@ -228,7 +232,12 @@ class CommandMuxNode(Node):
         return self._safety.resting_place(position_table_m, self._discs(now_ns))
 
     def _discs(self, now_ns: int) -> list[Disc]:
-        return self._surroundings.discs(self._sigma_m, now_ns, frozenset())
+        own = self._braking.state
+        exempt = frozenset[str]()
+        if own is not None and self._dockings:
+            states = {**self._surroundings.others(now_ns), self.vehicle: own}
+            exempt = may_touch(self.vehicle, self._dockings, states)
+        return self._surroundings.discs(self._sigma_m, now_ns, exempt)
 
     def _look_ahead(self, state: ControlState, now_ns: int) -> Outlook:
         braking_m_s2 = braking_to_count_on(self._model, self._braking.envelope)

@@ -14,6 +14,7 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.port import Port, PortRow
 from groundstation.declarations.rig import LABORATORY, MOCK_UP_RADIUS_M, Rig, check_address
 from groundstation.declarations.vehicle_type import VehicleType
+from groundstation.parts.control.sections import dockings_of
 from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.gauges import GAUGES
@@ -56,6 +57,7 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
         Surroundings(MOCK_UP_RADIUS_M, rig.table.obstacles()),
         model,
         modulator,
+        dockings_of(rig),
     )
 
 

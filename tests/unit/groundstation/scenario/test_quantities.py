@@ -1,6 +1,7 @@
 """Quantities of flights that are made by hand, with the right value in each."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from groundstation.parts.scenario.conditions import Bounds
 from groundstation.scenario.flight_log import VehicleTrack
 from groundstation.scenario.quantities import QUANTITIES, every_quantity
-from groundstation.scenario.run_tracks import Keeps, RunTracks, Span
+from groundstation.scenario.run_tracks import Docks, Keeps, RunTracks, Span
 from groundstation.watch.verdict import RunEvent
 
 T = np.arange(0.0, 20.0, 0.05)
@@ -137,3 +138,32 @@ def test_nothing_flown_is_unknown_or_nothing_and_no_error(what):
     pair = ("alpha", "beta") if QUANTITIES[what].is_of_pair else ("alpha",)
     found = value(flown(empty, empty), what, *pair)
     assert math.isnan(found.value) or found.value == 0.0
+
+
+def docking(beta):
+    """Beta and alpha, which stands at the origin; its port looks along +x."""
+    seen = flown(track(0.0 * T, heading=math.pi / 2), beta)
+    return replace(seen, docks={"beta": Docks("alpha", -math.pi / 2, 0.4)})
+
+
+def test_first_contact_is_measured_before_the_bumper_changes_it():
+    coming_in = np.where(T < 10.0, 0.4 + 0.008 * (10.0 - T), 0.4 + 0.004 * (T - 10.0))
+    seen = docking(track(coming_in, y=0.003))
+    speed = value(seen, "contact_speed_mm_s", "beta")
+    assert speed.value == pytest.approx(8.0, abs=0.1)
+    assert speed.at_s == pytest.approx(10.0, abs=0.1)
+    lateral = value(seen, "contact_lateral_mm", "beta")
+    assert lateral.value == pytest.approx(3.0)
+    assert lateral.at_s == speed.at_s
+    assert {"beta.contact_speed_mm_s", "beta.contact_lateral_mm"} <= dict(every_quantity(seen)).keys()
+    assert "alpha.contact_speed_mm_s" not in dict(every_quantity(seen))
+
+
+def test_who_never_touches_has_no_soft_contact():
+    seen = docking(track(0.402 + 0.0 * T))
+    assert math.isinf(value(seen, "contact_speed_mm_s", "beta").value)
+    assert math.isinf(value(seen, "contact_lateral_mm", "beta").value)
+
+
+def test_who_docks_with_nobody_has_none():
+    assert math.isnan(value(flown(track(0.0 * T), track(0.5 + 0.0 * T)), "contact_speed_mm_s", "beta").value)

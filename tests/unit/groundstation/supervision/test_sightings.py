@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from groundstation.control.corridor import Corridor, Docking
 from groundstation.supervision.sightings import ONLY_ALOFT
 
 MS = 1_000_000
@@ -202,6 +203,19 @@ class TestMotion:
     def test_another_vehicle_is_seen_in_time(self, known, seen, apart_m, expected):
         known.others = {"beta": seen(20 * S, (apart_m, 0.0))}
         assert self.fly(known, seen, 0.0) == expected
+
+    def test_who_docks_is_braked_for_outside_its_corridor_only(self, known, seen):
+        # 0.02 m/s at 0.31 m between centres, 0.3 m of bodies: they could not stop before they touch
+        corridor = Corridor(math.pi, 0.26, 0.4, 0.3, 0.015, 0.03, 0.02, 0.002)
+        known.name = "alpha"
+        known.dockings = (Docking("alpha", "beta", corridor),)
+        known.others = {"beta": seen(20 * S, (0.31, 0.0), (0.0, 0.0))}
+        assert self.fly(known, seen, 0.0, 0.02) == {}
+        assert set(self.fly(known, seen, 0.0, 0.1)) == {"vehicle_unavoidable"}  # too fast for the corridor
+        known.others = {"beta": seen(20 * S, (0.31, 0.03), (0.0, 0.0))}
+        assert set(self.fly(known, seen, 0.0, 0.02)) == {"vehicle_ahead"}  # beside the axis
+        known.others = {"gamma": seen(20 * S, (0.31, 0.0), (0.0, 0.0))}
+        assert set(self.fly(known, seen, 0.0, 0.02)) == {"vehicle_ahead"}  # another one
 
     def test_another_vehicle_that_was_not_seen_for_long_is_not_braked_for(self, known, seen):
         known.others = {"beta": seen(18 * S, (0.4, 0.0))}
