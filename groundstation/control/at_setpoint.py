@@ -4,6 +4,7 @@ While nobody says where that is, the last place is held at rest; before anybody 
 mock-up is.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,7 +12,9 @@ from dataclasses import replace
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
+from groundstation.control.motion_watch import AT_REST, Acceleration, MotionWatch
 from groundstation.control.state import BodyWrench, ControlState, Goal
+from groundstation.control.station import LONGEST_SPAN_S
 from groundstation.control.vehicle import VehicleModel
 
 
@@ -26,7 +29,7 @@ class AtSetpoint(ABC):
 
     def __init__(self, config: GoToConfig, vehicle: VehicleModel, keep_in: KeepIn | None) -> None:
         self._go_to = GoTo(config, vehicle, keep_in)
-        self._held: Goal | None = None
+        self.reset()
 
     @abstractmethod
     def wanted(self, state: ControlState, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
@@ -35,7 +38,13 @@ class AtSetpoint(ABC):
     def reset(self) -> None:
         """Forget way, disturbances and the last setpoint."""
         self._go_to.reset()
-        self._held = None
+        self._held: Goal | None = None
+        self._watches: dict[str, MotionWatch] = {}
+        self._accelerations: dict[str, Acceleration] = {}
+
+    def acceleration_of(self, neighbour: str) -> Acceleration:
+        """How a neighbour accelerates; at rest until it has been seen twice."""
+        return self._accelerations.get(neighbour, AT_REST)
 
     def setpoint(self, goal: Goal) -> Goal:
         """Where the neighbours want it; the goal before the first update."""
@@ -51,10 +60,21 @@ class AtSetpoint(ABC):
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`."""
+        if not (math.isfinite(dt_s) and dt_s > 0.0):
+            raise ValueError(f"dt_s must be above 0, found {dt_s}")
+        self._watch(neighbours, min(dt_s, LONGEST_SPAN_S))
         state = state.bounded()
         setpoint = self.wanted(state, goal.bounded(), neighbours)
         if setpoint is None:
             setpoint = self._held or Goal(state.position_table_m, state.heading_rad)
             setpoint = replace(setpoint, velocity_table_m_s=(0.0, 0.0), rate_rad_s=0.0)
+            setpoint = replace(setpoint, acceleration_table_m_s2=(0.0, 0.0), angular_acceleration_rad_s2=0.0)
         self._held = setpoint
         return self._go_to.update(state, setpoint, dt_s, applied=applied)
+
+    def _watch(self, neighbours: Mapping[str, ControlState], dt_s: float) -> None:
+        """Find the neighbours' accelerations; who was silent is watched anew."""
+        self._watches = {name: self._watches.get(name) or MotionWatch() for name in neighbours}
+        self._accelerations = {
+            name: watch.update(neighbours[name].bounded(), dt_s) for name, watch in self._watches.items()
+        }

@@ -28,13 +28,17 @@ class DisturbanceObserver:
         self.disturbance = 0.0
         """Acceleration that neither the valves nor the known slope explain."""
 
-    def update(self, measured_speed: float, own_acceleration: float, dt_s: float) -> None:
+    def update(
+        self, measured_speed: float, own_acceleration: float, dt_s: float, *, learns: bool = True
+    ) -> None:
         """Advance by one span.
 
         Args:
             measured_speed: Velocity at the end of the span.
             own_acceleration: Mean acceleration over the span by everything that is known.
             dt_s: Length of the span.
+            learns: What is left unexplained is a disturbance; not while the valves push so hard that it
+                is rather their own error.
         """
         if not self._started:
             self._started = True
@@ -44,5 +48,7 @@ class DisturbanceObserver:
         predicted = self.speed + (own_acceleration + self.disturbance) * dt_s
         innovation = measured_speed - predicted
         self.speed = predicted + (1.0 - pole * pole) * innovation
+        if not learns:
+            return
         disturbance = self.disturbance + (1.0 - pole) ** 2 / dt_s * innovation
         self.disturbance = min(max(disturbance, -self._limit), self._limit)

@@ -21,12 +21,13 @@ class MotionLimits:
 
     A goal that was reached and then jumps by less than `capture` is taken over at once: a neighbour's
     estimate jumps by millimetres at each star fix, and planning a way across each jump would only shake the
-    valves.
+    valves. ``braking`` is the largest deceleration, where it is another one than the acceleration (a slope).
     """
 
     speed: float
     acceleration: float
     capture: float = 0.0
+    braking: float | None = None
 
 
 def approach_speed(distance: float, acceleration: float, dt_s: float) -> float:
@@ -66,13 +67,16 @@ class PointReference:
             self._arrive(goal, goal_velocity)
             return
         self.is_at_goal = False
-        speed = min(approach_speed(distance, _BRAKING_SHARE * limits.acceleration, dt_s), limits.speed)
+        braking = _BRAKING_SHARE * limits.acceleration if limits.braking is None else limits.braking
+        speed = min(approach_speed(distance, braking, dt_s), limits.speed)
         # never beyond the goal within this step
         speed = min(speed, distance / dt_s)
         heading = (way[0] / distance, way[1] / distance) if distance > 0.0 else (0.0, 0.0)
         wanted = limit_length(
             (speed * heading[0] + goal_velocity[0], speed * heading[1] + goal_velocity[1]), limits.speed
         )
+        if math.hypot(*wanted) < math.hypot(*self.velocity):
+            step = max(step, braking * dt_s)
         change = limit_length((wanted[0] - self.velocity[0], wanted[1] - self.velocity[1]), step)
         self.velocity = (self.velocity[0] + change[0], self.velocity[1] + change[1])
         self.acceleration = (change[0] / dt_s, change[1] / dt_s)

@@ -27,6 +27,9 @@ from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
+LEARNING_SHARE = 0.5
+"""Of the force in every direction: who pushes harder learns nothing of the table, for a twentieth of that
+push, by which valves differ, would pass for a slope."""
 LONGEST_SPAN_S = 1.0  # after a longer gap the observer takes the measurement as it is
 
 
@@ -46,13 +49,13 @@ class StationConfig(BaseModel):
     position_error_m: float = Field(default=0.015, gt=0.0)
     acceleration_m_s2: float = Field(default=0.010, gt=0.0)
     largest_error_m: float = Field(default=0.10, gt=0.0)
-    position_deadband_m: float = Field(default=0.0015, ge=0.0)
-    observer_rad_s: float = Field(default=0.35, gt=0.0)
+    position_deadband_m: float = Field(default=0.0005, ge=0.0)
+    observer_rad_s: float = Field(default=0.6, gt=0.0)
     largest_slope_m_s2: float = Field(default=0.010, ge=0.0)
     heading_error_deg: float = Field(default=0.3, gt=0.0)
     angular_acceleration_deg_s2: float = Field(default=0.5, gt=0.0)
     largest_heading_error_deg: float = Field(default=10.0, gt=0.0)
-    heading_deadband_deg: float = Field(default=0.05, ge=0.0)
+    heading_deadband_deg: float = Field(default=0.02, ge=0.0)
     heading_observer_rad_s: float = Field(default=0.8, gt=0.0)
     largest_disturbance_torque_nm: float = Field(default=0.010, ge=0.0)
 
@@ -115,8 +118,9 @@ class StationKeeping:
         mass_kg = self._vehicle.mass_kg
         acted = self._envelope.saturate(applied)
         push, slope = rotate(acted.force_body_n, state.heading_rad), state.slope_table_m_s2
-        self._x.update(state.velocity_table_m_s[0], push[0] / mass_kg + slope[0], dt_s)
-        self._y.update(state.velocity_table_m_s[1], push[1] / mass_kg + slope[1], dt_s)
+        learns = math.hypot(*push) <= LEARNING_SHARE * self._envelope.max_force_n
+        self._x.update(state.velocity_table_m_s[0], push[0] / mass_kg + slope[0], dt_s, learns=learns)
+        self._y.update(state.velocity_table_m_s[1], push[1] / mass_kg + slope[1], dt_s, learns=learns)
         self._turn.update(state.rate_rad_s, acted.torque_nm / self._vehicle.inertia_kg_m2, dt_s)
 
     def _force_table_n(self, state: ControlState, goal: Goal) -> Vector2:

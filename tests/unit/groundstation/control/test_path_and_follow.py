@@ -41,6 +41,51 @@ def test_a_free_follower_takes_over_only_the_speed_along_the_way_to_its_leader()
     assert goal.rate_rad_s == pytest.approx(0.05 / 0.8)  # the leader passes to the left: it turns after it
 
 
+def after(law, leader_at, state, seconds=4.0, dt_s=0.1):
+    """The setpoint once a moving leader has been watched for a while; the follower stays where it is."""
+    for count in range(round(seconds / dt_s) + 1):
+        law.update(state, HERE, dt_s, neighbours={"leader": leader_at(count * dt_s)})
+    return law.setpoint(HERE)
+
+
+def test_a_leader_that_speeds_up_takes_its_follower_along_at_once():
+    def leader_at(t_s):
+        return ControlState((0.8 + 0.0075 * t_s**2, 0.0), (0.015 * t_s, 0.0), 0.0, 0.0)
+
+    goal = after(
+        follow(bearing="table", bearing_deg=180.0), leader_at, ControlState((0, 0), (0, 0), 0.0, 0.0)
+    )
+    assert goal.acceleration_table_m_s2 == pytest.approx((0.015, 0.0), abs=1e-4)
+    # facing along the line, no acceleration across it: the heading has none
+    assert goal.angular_acceleration_rad_s2 == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_leader_that_passes_is_kept_at_its_distance_by_the_acceleration_that_a_circle_takes():
+    state = ControlState((-0.8, 0.0), (0.0, 0.0), 0.0, 0.0)
+    goal = after(follow(), lambda t_s: ControlState((0.0, 0.06 * (t_s - 4.0)), (0.0, 0.06), 0.0, 0.0), state)
+    # to hold r as the bearing turns at v / r takes v^2 / r towards the leader's circle: away stays 0.8 m
+    assert goal.acceleration_table_m_s2 == pytest.approx((0.06**2 / 0.8, 0.0), abs=1e-5)
+
+
+def test_a_place_carried_by_a_turning_leader_has_the_accelerations_of_its_circle():
+    def leader_at(t_s):
+        return ControlState((0.0, 0.0), (0.0, 0.0), 0.01 * (t_s - 4.0) ** 2, 0.2 + 0.02 * (t_s - 4.0))
+
+    goal = after(
+        follow(bearing="leader", bearing_deg=0.0), leader_at, ControlState((0.8, 0), (0, 0), 0.0, 0.0)
+    )
+    assert goal.acceleration_table_m_s2 == pytest.approx((-(0.2**2) * 0.8, 0.02 * 0.8), abs=2e-4)
+
+
+def test_the_way_a_leader_speeds_up_is_forgotten_when_it_falls_silent():
+    law, state = follow(bearing="table", bearing_deg=180.0), ControlState((0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
+    after(law, lambda t_s: ControlState((0.8, 0.0), (0.015 * t_s, 0.0), 0.0, 0.0), state)
+    law.update(state, HERE, 0.1)
+    assert law.setpoint(HERE).acceleration_table_m_s2 == (0.0, 0.0)
+    law.update(state, HERE, 0.1, neighbours={"leader": ControlState((0.8, 0.0), (0.0, 0.0), 0.0, 0.0)})
+    assert law.setpoint(HERE).acceleration_table_m_s2 == (0.0, 0.0)
+
+
 def test_a_bearing_of_the_table_stays_one_of_the_leader_turns_with_it():
     leader = ControlState((0.0, 0.0), (0.0, 0.0), math.pi / 2, 0.1)
     state = ControlState((1.0, 0.0), (0.0, 0.0), 0.0, 0.0)

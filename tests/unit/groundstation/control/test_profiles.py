@@ -1,0 +1,106 @@
+"""Ways of least gas and of least time, against linear programming and the bang-bang limit."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from groundstation.control.authority import authority_along
+from groundstation.control.coasting import fastest, least_gas
+from groundstation.control.go_to import GoTo, GoToConfig
+from groundstation.control.state import Goal
+from groundstation.control.vehicle import VehicleModel, square_of_eight
+from groundstation.control.wrench_envelope import WrenchEnvelope
+
+VEHICLE = VehicleModel(11.0, 0.25, square_of_eight())
+PUSH_M_S2 = 0.036
+
+
+def programmed(distance_m, duration_s, pull_m_s2, slices=400):
+    """Authority: the least integral of |u| by a linear programme over slices of constant push, m/s."""
+    dt_s = duration_s / slices
+    left_s = duration_s - (np.arange(slices) + 0.5) * dt_s
+    rows = np.vstack([np.full(slices, dt_s), left_s * dt_s])
+    wanted = (-pull_m_s2 * duration_s, distance_m - 0.5 * pull_m_s2 * duration_s**2)
+    found = linprog(
+        np.full(2 * slices, dt_s), A_eq=np.hstack([rows, -rows]), b_eq=wanted, bounds=(0.0, PUSH_M_S2)
+    )
+    return found.fun
+
+
+@pytest.mark.parametrize("pull_m_s2", [0.0, 0.001, 0.005, -0.001, -0.005, -0.012])
+@pytest.mark.parametrize("duration_s", [13.0, 20.0, 40.0])
+def test_coasting_takes_what_the_linear_programme_takes_and_arrives_at_rest(pull_m_s2, duration_s):
+    phases = least_gas(1.0, duration_s, PUSH_M_S2, pull_m_s2)
+    assert phases.duration_s == pytest.approx(duration_s)
+    way, speed, _ = phases.at(duration_s - 1e-9)
+    assert way == pytest.approx(1.0, abs=1e-6)
+    assert speed == pytest.approx(0.0, abs=1e-6)
+    gas = sum(
+        abs(acceleration - pull_m_s2) * span_s
+        for acceleration, span_s in zip(phases.accelerations_m_s2, phases.spans_s, strict=True)
+    )
+    assert gas == pytest.approx(programmed(1.0, duration_s, pull_m_s2), rel=0.01)
+    pushes = [acceleration - pull_m_s2 for acceleration in phases.accelerations_m_s2]
+    assert max(map(abs, pushes)) <= PUSH_M_S2 * (1 + 1e-9)
+
+
+def test_too_short_a_time_gets_the_fastest_way():
+    assert least_gas(1.0, 5.0, PUSH_M_S2, 0.003) == fastest(1.0, PUSH_M_S2, 0.003)
+    # uphill on the way, downhill for the brakes: half of each square
+    assert fastest(1.0, 0.04, 0.0).duration_s == pytest.approx(2.0 * math.sqrt(1.0 / 0.04))
+
+
+def test_a_slope_that_the_valves_cannot_hold_is_refused():
+    with pytest.raises(ValueError, match="cannot hold"):
+        least_gas(1.0, 20.0, 0.01, -0.01)
+
+
+def test_two_valves_push_along_a_face_and_four_along_a_diagonal():
+    envelope = WrenchEnvelope(VEHICLE)
+    face = authority_along((1.0, 0.0), 0.0, (-0.003, 0.001), VEHICLE, envelope)
+    assert face == pytest.approx((0.04, 0.04, -0.003))
+    assert (face.accelerating(1.0), face.braking(1.0)) == pytest.approx((0.037, 0.043))
+    corner = authority_along((1.0, 0.0), math.pi / 4, (0.0, 0.0), VEHICLE, envelope)
+    assert corner.forwards_m_s2 == pytest.approx(0.04 * math.sqrt(2.0))
+    assert authority_along((1.0, 0.0), None, (0.0, 0.0), VEHICLE, envelope).forwards_m_s2 == pytest.approx(
+        0.04
+    )
+
+
+@pytest.mark.parametrize("slope_m_s2", [0.0, 0.003, -0.003])
+def test_the_fast_way_takes_hardly_longer_than_bang_bang_and_does_not_overshoot(fly, world, slope_m_s2):
+    """Weak valves, and the harsh estimate of conftest without its jumps."""
+    there = Goal((1.0, 0.0), 0.0)
+    quiet = world(
+        slope_table_m_s2=(slope_m_s2, 0.0), fix_sigma_m=0.0, speed_sigma_m_s=0.0, rate_noise_sigma_rad_s=0.0
+    )
+    flight = fly(GoTo(GoToConfig(profile="time"), VEHICLE), there, world=quiet, duration_s=30.0)
+    x = np.array(flight.pose)[:, 0]
+    limit_s = fastest(1.0, 0.04, slope_m_s2).duration_s
+    settled = np.flatnonzero(np.abs(x - 1.0) > 0.010)
+    assert flight.time_s[settled[-1]] < 1.4 * limit_s
+    assert x.max() < 1.0 + 0.015
+
+
+def test_a_way_of_least_gas_takes_its_time_and_hardly_more_gas_than_the_least(fly, world):
+    quiet = world(
+        slope_table_m_s2=(0.0, 0.0),
+        disturbance_torque_nm=0.0,
+        fix_sigma_m=0.0,
+        speed_sigma_m_s=0.0,
+        rate_noise_sigma_rad_s=0.0,
+    )
+    law = GoTo(GoToConfig(profile="gas", duration_s=20.0), VEHICLE)
+    flight = fly(law, Goal((1.0, 0.0), 0.0), world=quiet, duration_s=22.0)
+    pose = np.array(flight.pose)
+    assert pose[-1, 0] == pytest.approx(1.0, abs=0.01)
+    assert pose[100, 0] == pytest.approx(0.5, abs=0.03)
+    least_n_s = 11.0 * programmed(1.0, 20.0, 0.0)
+    assert flight.gas_n_s < 1.4 * least_n_s
+
+
+def test_a_time_belongs_to_the_profile_of_least_gas():
+    with pytest.raises(ValueError, match="duration_s goes with"):
+        GoToConfig(duration_s=20.0)
