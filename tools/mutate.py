@@ -33,6 +33,7 @@ from mutate_operators import Mutant, mutants_of
 ROOT = Path(__file__).parents[1]
 TARGETS = Path(__file__).with_name("mutate_targets.toml")
 BEGIN, END = "<!-- mutants:begin -->", "<!-- mutants:end -->"
+PROFILE = "mutants"
 IGNORED = ("-W", "ignore::pytest.PytestAssertRewriteWarning")  # of what is imported before the fork
 KILLED, SURVIVED, TIMED_OUT, EQUIVALENT = "killed", "survived", "timed out", "equivalent"
 
@@ -94,7 +95,18 @@ def judge(mutant: Mutant | None, tests: list[str]) -> None:
         sys.meta_path.insert(0, _Finder(module, mutant))
     import pytest
 
-    words = ["-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--no-header", "--tb=no", *IGNORED]
+    words = [
+        "-q",
+        "-x",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+        "--no-header",
+        "--tb=no",
+        f"--hypothesis-profile={PROFILE}",
+        *IGNORED,
+    ]
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
@@ -136,6 +148,14 @@ def preload() -> None:
                  "pydantic", "cantools",
                  "typer.testing", "xdist.plugin", "pytest_timeout", "_hypothesis_pytestplugin"):  # fmt: skip
         importlib.import_module(name)
+    hypothesis = importlib.import_module("hypothesis")
+    phases = (
+        hypothesis.Phase.explicit,
+        hypothesis.Phase.generate,
+    )  # a failure is enough, the least is not asked
+    hypothesis.settings.register_profile(
+        PROFILE, phases=phases, deadline=None, derandomize=True, database=None
+    )
 
 
 def report(found: Counter[str], per_file: dict[str, Counter[str]], seed: int) -> str:

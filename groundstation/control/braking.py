@@ -56,7 +56,7 @@ class Braking:
         self.envelope = envelope
         self.state: ControlState | None = None
         self.held: Goal | None = None
-        self._state_ns = 0
+        self._state_ns: int  # of the state, so there is none before the first
         self._delivered = NO_WRENCH
 
     def take(self, state: ControlState, now_ns: int) -> None:

@@ -15,7 +15,7 @@ to half of the condition (U. Borrmann and others, Control barrier certificates f
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -122,7 +122,7 @@ class SafetyFilter:
             return Filtered(wanted_m_s2, (), must_brake=False)
         if found is None or math.hypot(*found.point) > available_m_s2:
             broken = [plane for plane in planes if _along(plane.normal, wanted_m_s2) > plane.bound]
-            return Filtered((0.0, 0.0), _names(broken or planes), must_brake=True)
+            return Filtered((0.0, 0.0), _names(broken), must_brake=True)
         return Filtered(found.point, _names(found.active), must_brake=False)
 
     def resting_place(self, position_table_m: Vector2, discs: Sequence[Disc]) -> Vector2:
@@ -154,9 +154,8 @@ class SafetyFilter:
     def _disc(self, state: ControlState, disc: Disc, braking_m_s2: float) -> HalfPlane:
         towards, apart_m = _towards(state.position_table_m, disc.position_table_m)
         theirs_m_s = -_along(disc.velocity_table_m_s, towards)  # towards this mock-up
-        way_m = 0.0
-        if theirs_m_s > 0.0:
-            way_m = theirs_m_s * self._stopping_s(math.hypot(*disc.velocity_table_m_s), braking_m_s2)
+        stopping_s = self._stopping_s(math.hypot(*disc.velocity_table_m_s), braking_m_s2)
+        way_m = max(theirs_m_s, 0.0) * stopping_s
         return self._condition(
             disc.name, towards, apart_m - disc.reach_m, state, way_m, theirs_m_s, disc.share, braking_m_s2
         )
@@ -195,20 +194,6 @@ class SafetyFilter:
         closing_m_s = approach_m_s + (theirs_m_s if share == 1.0 else 0.0)
         bound = share * self.config.gain_per_s * room_m - closing_m_s
         return HalfPlane(normal, bound - _along(normal, state.slope_table_m_s2), whose)
-
-
-def discs_of(others: Mapping[str, ControlState], reach_m: float, moving: frozenset[str]) -> list[Disc]:
-    """Other mock-ups as discs.
-
-    Args:
-        others: Their states, carried to the present.
-        reach_m: Between centres that touch, doubt included.
-        moving: Names of those that keep to their half of the condition: flown by the same filter.
-    """
-    return [
-        Disc(name, other.position_table_m, other.velocity_table_m_s, reach_m, 0.5 if name in moving else 1.0)
-        for name, other in others.items()
-    ]
 
 
 def table_acceleration(wrench: BodyWrench, heading_rad: float, mass_kg: float) -> Vector2:

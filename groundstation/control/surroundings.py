@@ -57,9 +57,7 @@ class Surroundings:
             now_ns: Moment of the arrival.
             is_flown: It is in flight: its own filter keeps to its half of what is between both.
         """
-        doubt_m = _SIGMAS * math.hypot(*sigma_m)
-        doubt_m = min(doubt_m, _LARGEST_DOUBT_M) if math.isfinite(doubt_m) else _LARGEST_DOUBT_M
-        self._seen[name] = _Seen(now_ns, state, doubt_m, is_flown)
+        self._seen[name] = _Seen(now_ns, state, _doubt_m(sigma_m), is_flown)
 
     def others(self, now_ns: int) -> dict[str, ControlState]:
         """States of the others, carried to the present; who is silent stands."""
@@ -73,7 +71,7 @@ class Surroundings:
             now_ns: The present.
             exempt: Names of those that may be touched: who docks with them.
         """
-        own_m = min(_SIGMAS * math.hypot(*own_sigma_m), _LARGEST_DOUBT_M)
+        own_m = _doubt_m(own_sigma_m)
         reach_m = 2.0 * self.radius_m + TOUCH_RESERVE_M
         found = []
         for name, seen in self._seen.items():
@@ -90,6 +88,11 @@ class Surroundings:
             reach_m = self.radius_m + obstacle.radius_m + TOUCH_RESERVE_M + own_m
             found.append(Disc(obstacle.name, obstacle.position_table_m, (0.0, 0.0), reach_m, 1.0))
         return found
+
+
+def _doubt_m(sigma_m: tuple[float, float]) -> float:
+    doubt_m = _SIGMAS * math.hypot(*sigma_m)
+    return doubt_m if doubt_m < _LARGEST_DOUBT_M else _LARGEST_DOUBT_M  # so is one that is no number
 
 
 def _now(seen: _Seen, now_ns: int) -> tuple[ControlState, bool]:

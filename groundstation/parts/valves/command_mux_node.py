@@ -74,12 +74,12 @@ class CommandMuxNode(Node):
         self._modulator = modulator
         self._dockings = dockings
         self._period_ns = round(modulator.config.period_s * 1e9)
-        self._due_ns = 0
+        self._due_ns: int  # since the source changed, from none to closed at first
         self._hand = HandPush(self._period_ns)
         self._ruling: Supervision | None = None
-        self._ruling_ns = 0
+        self._ruling_ns: int  # of the ruling
         self._lease = LeaseCheck()
-        self._sigma_m = (0.0, 0.0)
+        self._sigma_m: tuple[float, float]  # of the state that braking has
         self._counter = self._pulse_id = self._ticks = 0
         self._on_time_ms = CLOSED
         self._source: Source | None = None

@@ -17,7 +17,8 @@ class HandPush:
     def __init__(self, period_ns: int) -> None:
         self._period_ns = period_ns
         self._wrench: BodyWrench | None = None
-        self._until_ns = self._due_ns = 0
+        self._until_ns: int  # both with the wrench
+        self._due_ns: int
 
     def begin(self, request: Request, ruling: Supervision | None, now_ns: int) -> str:
         """Push from now on; the reason if it cannot be done."""

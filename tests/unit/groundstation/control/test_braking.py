@@ -7,7 +7,8 @@ import pytest
 
 from groundstation.control.brake import BrakeConfig, brake_wrench, dead_reckoned
 from groundstation.control.braking import Braking
-from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, rotate
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal, rotate
+from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.control.wrench_envelope import WrenchEnvelope
 
@@ -123,3 +124,62 @@ def test_without_new_states_it_reckons_and_holds_nothing():
     braking.deliver(NO_WRENCH)
     braking.wrench(2 * PERIOD_NS)
     assert braking.state.position_table_m[0] > reckoned.position_table_m[0]
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "rate_deg_s", "is_held"),
+    [(0.0079, 0.0, True), (0.008, 0.0, False), (0.0, 1.95, True), (0.0, 2.0, False), (0.0, -2.05, False)],
+)
+def test_the_limits_of_rest(speed_m_s, rate_deg_s, is_held):
+    braking = make()
+    braking.take(ControlState((0.1, 0.2), (0.0, speed_m_s), 0.3, math.radians(rate_deg_s)), 0)
+    braking.wrench(0)
+    assert (braking.held is not None) is is_held
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "rate_deg_s", "is_held"),
+    [(0.04, 8.0, True), (0.0405, 0.0, False), (0.0, 8.05, False), (0.0, -8.05, False), (0.039, 7.95, True)],
+)
+def test_the_limits_of_what_counts_as_pushed(speed_m_s, rate_deg_s, is_held):
+    braking = make()
+    braking.take(ControlState((0.0, 0.0), (0.0, 0.0), 0.0, 0.0), 0)
+    braking.wrench(0)
+    braking.take(ControlState((0.0, 0.0), (speed_m_s, 0.0), 0.0, math.radians(rate_deg_s)), PERIOD_NS)
+    braking.wrench(PERIOD_NS)
+    assert (braking.held is not None) is is_held
+
+
+def test_a_held_place_is_kept_by_a_station_that_begins_anew_and_is_told_what_was_delivered():
+    """Twice: rest, a force beside the pulses, a push; the second time as if there had been no first."""
+    braking = make()
+    delivered = BodyWrench((0.05, -0.03), 0.002)
+    for round_ in range(2):
+        station = StationKeeping(StationConfig(), MODEL)
+        begin_ns = 10 * round_ * PERIOD_NS
+        for step in range(4):
+            state = ControlState((0.1 + 0.01 * step, 0.2), (0.002 * step, 0.0), 0.3, 0.01 * step)
+            braking.deliver(delivered)
+            braking.take(state, begin_ns + step * PERIOD_NS)
+            found = braking.wrench(begin_ns + step * PERIOD_NS)
+            assert braking.held == Goal((0.1, 0.2), 0.3)
+            assert found == station.update(state, braking.held, 0.1, applied=delivered)
+        braking.take(ControlState((0.0, 0.0), (0.2, 0.0), 0.0, 0.0), begin_ns + 5 * PERIOD_NS)
+        braking.wrench(begin_ns + 5 * PERIOD_NS)
+        assert braking.held is None
+
+
+def test_before_anything_was_delivered_nothing_was():
+    braking = make()
+    state = ControlState((0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
+    braking.take(state, 0)
+    braking.wrench(PERIOD_NS + 1)
+    assert braking.state == state
+
+
+def test_where_to_hold_is_asked_with_place_and_time():
+    braking, asked = make(), []
+    braking.take(ControlState((0.1, 0.2), (0.0, 0.0), 0.0, 0.0), 7)
+    braking.wrench(9, lambda position, now_ns: asked.append((position, now_ns)) or (0.5, 0.6))
+    assert asked == [((0.1, 0.2), 9)]
+    assert braking.held.position_table_m == (0.5, 0.6)

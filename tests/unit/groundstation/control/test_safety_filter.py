@@ -14,7 +14,6 @@ from groundstation.control.safety_filter import (
     SafetyFilter,
     SafetyFilterConfig,
     body_force,
-    discs_of,
     table_acceleration,
 )
 from groundstation.control.state import BodyWrench, ControlState
@@ -108,11 +107,13 @@ def fly(filter_, bodies, wants, rng, *, steps=400, period_s=0.1, late_s=0.1):
     for step in range(steps):
         states = list(bodies)
         for index, body in enumerate(states):
-            others = {str(k): each for k, each in enumerate(states) if k != index}
+            others = [
+                Disc(str(k), each.position_table_m, each.velocity_table_m_s, REACH_M, 0.5)
+                for k, each in enumerate(states)
+                if k != index
+            ]
             wanted = wants(step, index, rng)
-            found = filter_.filtered(
-                tuple(wanted), body, discs_of(others, REACH_M, frozenset(others)), BRAKING_M_S2
-            )
+            found = filter_.filtered(tuple(wanted), body, others, BRAKING_M_S2)
             if found.must_brake:
                 v = np.array(body.velocity_table_m_s)
                 speed = np.linalg.norm(v)

@@ -69,3 +69,56 @@ def test_who_docks_with_it_may_touch_it():
     around.see("beta", state(1.0), (0.0, 0.0), 0, is_flown=True)
     around.see("gamma", state(2.0), (0.0, 0.0), 0, is_flown=True)
     assert disc(around, exempt=frozenset({"beta"})).name == "gamma"
+
+
+@pytest.mark.parametrize(("age_s", "share", "x"), [(1.0, 0.5, 1.1), (1.05, 1.0, 1.1), (0.95, 0.5, 1.095)])
+def test_a_second_of_silence_is_still_none(age_s, share, x):
+    around = Surroundings(0.2)
+    around.see("beta", state(1.0, 0.1), (0.0, 0.0), 0, is_flown=True)
+    found = disc(around, round(age_s * S))
+    assert found.share == share
+    assert found.position_table_m == pytest.approx((x, 0.0))
+
+
+def test_who_is_silent_has_stopped_and_does_not_turn():
+    around = Surroundings(0.2)
+    around.see("beta", ControlState((1.0, 2.0), (0.1, -0.2), 0.3, 0.5), (0.0, 0.0), 5 * S, is_flown=True)
+    stands = around.others(7 * S)["beta"]
+    assert stands.position_table_m == pytest.approx((1.1, 1.8))
+    assert stands.velocity_table_m_s == (0.0, 0.0)
+    assert (stands.heading_rad, stands.rate_rad_s) == (pytest.approx(0.8), 0.0)
+
+
+@pytest.mark.parametrize(("speed", "share"), [(0.0052, 0.5), (0.005, 1.0), (0.0048, 1.0)])
+def test_what_counts_as_moving(speed, share):
+    around = Surroundings(0.2)
+    around.see("beta", state(1.0, speed), (0.0, 0.0), 0, is_flown=True)
+    assert disc(around).share == share
+
+
+@pytest.mark.parametrize("own", [(1.0, 0.0), (math.nan, 0.0), (math.inf, math.inf)])
+def test_the_doubt_of_the_own_place_has_an_end_too(own):
+    around = Surroundings(0.2, (Obstacle("lamp", (0.5, 0.5), 0.1),))
+    assert disc(around, own=own).reach_m == pytest.approx(0.2 + 0.1 + 0.02 + 0.15)
+
+
+@pytest.mark.parametrize(("sigma_m", "doubt_m"), [(0.049, 0.147), (0.051, 0.15)])
+def test_where_the_doubt_ends(sigma_m, doubt_m):
+    around = Surroundings(0.2)
+    around.see("beta", state(1.0), (sigma_m, 0.0), 0, is_flown=True)
+    assert disc(around).reach_m == pytest.approx(0.4 + 0.02 + doubt_m)
+
+
+def test_all_that_is_around_is_there_in_one_list():
+    around = Surroundings(0.1, (Obstacle("lamp", (0.5, 0.4), 0.3), Obstacle("box", (-0.5, 0.0), 0.2)))
+    around.see("beta", ControlState((1.0, 2.0), (0.1, -0.2), 0.3, 0.5), (0.0, 0.0), 0, is_flown=True)
+    around.see("gamma", state(3.0), (0.0, 0.0), 0, is_flown=False)
+    around.see("beta", ControlState((1.1, 2.0), (0.1, -0.2), 0.3, 0.5), (0.0, 0.0), 0, is_flown=True)
+    found = around.discs((0.0, 0.0), 0, frozenset())
+    assert [tuple(each) for each in found] == [
+        ("beta", (1.1, 2.0), (0.1, -0.2), pytest.approx(0.22), 0.5),
+        ("gamma", (3.0, 0.0), (0.0, 0.0), pytest.approx(0.22), 1.0),
+        ("lamp", (0.5, 0.4), (0.0, 0.0), pytest.approx(0.42), 1.0),
+        ("box", (-0.5, 0.0), (0.0, 0.0), pytest.approx(0.32), 1.0),
+    ]
+    assert TOUCH_RESERVE_M == 0.02

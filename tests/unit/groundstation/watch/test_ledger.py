@@ -217,3 +217,21 @@ def test_a_long_flight_takes_bounded_memory(message, delivered, cause, monkeypat
     assert max(sizes) <= 64
     p50, p99 = ages_ms(ledger)
     assert (p50["bus"], p99["bus"]) == pytest.approx((72.0, 72.0))
+
+
+def test_how_much_is_kept_at_most():
+    assert (module._SAMPLES, module._ORIGINS, module._WAITING) == (2000, 16384, 4096)
+    kept = {}
+    for number in range(4):
+        module._keep(kept, number, -number, 4)
+    assert kept == {0: 0, 1: -1, 2: -2, 3: -3}
+    module._keep(kept, 4, -4, 4)  # the oldest half goes
+    assert kept == {2: -2, 3: -3, 4: -4}
+
+
+def test_the_first_time_counts_and_known_light_takes_no_room(monkeypatch):
+    monkeypatch.setattr(module, "_SAMPLES", 2)
+    vehicle = module._Vehicle()
+    for exposure_ns, at_ns in ((1, 9), (2, 8), (1, 7), (1, 8), (2, 8)):
+        vehicle.reach("bus", exposure_ns, at_ns)
+    assert vehicle.first_ns["bus"] == {1: 7, 2: 8}
