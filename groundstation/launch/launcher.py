@@ -258,7 +258,9 @@ class Launcher:
             child = self._children[name]
             child.started_s = self._time.now_s
             memory = self._memory.address(has_kept=child.restarts > 0 and child.has_been_ready)
-            child.write(pickle.dumps(Go({**self._addresses, f"{STATION_CHANNEL}memory": memory})))
+            own = {"memory": memory, "hub": self.endpoint}
+            addresses = {f"{STATION_CHANNEL}{name}": address for name, address in own.items()}
+            child.write(pickle.dumps(Go({**self._addresses, **addresses})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
