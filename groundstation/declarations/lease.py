@@ -54,7 +54,7 @@ class LeaseCheck:
         return f"{held_words(lease, now_ns)}; ask for it with take_control"
 
     def objection_to_commands(self, author: str, now_ns: int) -> str:
-        """Why a program may not command a vehicle now; empty if it may: unlike who asks it needs the lease."""
+        """Why a program may not command a vehicle now; empty if it may: it must hold the lease."""
         lease = self._lease
         if lease is None or not lease.holder:
             return "nobody holds control: ask for it with take_control"
