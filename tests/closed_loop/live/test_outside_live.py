@@ -1,4 +1,4 @@
-"""A program outside flies alpha and is killed: it brakes and holds, by name; resume gives it back; replayed."""
+"""A program outside flies alpha and is killed: it brakes and holds; resume gives it back; and it replays."""
 
 import os
 import re
