@@ -17,7 +17,7 @@ from zenoh.handlers import Callback
 from drivers.errors import LinkLost, NotFound
 from drivers.outside.protocol import LONGEST_BYTES, PREFIX, REQUEST, WRENCH, key_of
 
-PAUSE_S = 0.005
+PAUSE_S = 0.01
 MOST_WRENCHES, MOST_REQUESTS = 4, 32
 """That wait, per vehicle; of wrenches the newest counts, and two programs may send them by mistake."""
 LONGEST_KEY = 100

@@ -1,6 +1,7 @@
 /* Hold a mock-up where it is from outside: a program in C that needs nothing but zenoh-pico.
  *
- *     cc -std=c11 -DZENOH_LINUX -I zenoh-pico/include hold.c -o hold zenoh-pico/build/lib/libzenohpico.a -lpthread -lm
+ *     cc -std=c11 -DZENOH_LINUX -I zenoh-pico/include -I zenoh-pico/build/include hold.c -o hold \
+ *         zenoh-pico/build/lib/libzenohpico.a -lpthread -lm
  *     ./hold tcp/127.0.0.1:7447 alpha anna 30
  *
  * It asks for the control lease, reads the state of the vehicle, and sends ten wrenches a second in body axes
