@@ -50,6 +50,10 @@ def run(
         str | None, typer.Option("--i-know", help="Fly although the dry run was refused: why.")
     ] = None,
     compare: Annotated[Path | None, typer.Option(help="Recording that the report lays beside.")] = None,
+    hub_port: Annotated[
+        int,
+        typer.Option(help="Where programs outside reach it, on loopback; 0: a free port.", min=0, max=65535),
+    ] = 0,
 ) -> None:
     """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds; or a scenario until it is over.
 
@@ -75,6 +79,8 @@ def run(
     if is_scenario(content):
         if duration is not None:
             raise UsageError("--duration goes with a rig: a scenario has its own")
+        if hub_port:
+            raise UsageError("--hub-port goes with a rig: nobody commands a scenario from outside")
         from groundstation.cli.run_scenario import Asked, run_scenario
 
         asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know)
@@ -89,6 +95,8 @@ def run(
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
     recording = record or loaded.record.directory / f"{stamp}.mcap"
     if lockstep:
+        if hub_port:
+            raise UsageError("--hub-port goes with real time: in virtual time nobody comes from outside")
         if duration is None:
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
     elif seed is not None:
@@ -100,7 +108,7 @@ def run(
             with RunProgress(duration) as update:
                 faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
         else:
-            live = LiveRun(loaded, text, file, recording)
+            live = LiveRun(loaded, text, file, recording, hub_port=hub_port)
             run_live(live, duration, headless=headless or not sys.stdout.isatty())
             faults, trouble = live.faults, live.launcher.recording_trouble
     finally:

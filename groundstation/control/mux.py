@@ -62,7 +62,14 @@ class Selection(Generic[Demand]):
 
 
 class CommandMux(Generic[Demand]):
-    """Chooses among the sources; all times are nanoseconds of one clock, given by the caller."""
+    """Chooses among the sources; all times are nanoseconds of one clock, given by the caller.
+
+    Args:
+        config: How long each input stays fresh.
+
+    Attributes:
+        outside_lifetime_ns: After so long a program outside is silent.
+    """
 
     def __init__(self, config: MuxConfig) -> None:
         self._lifetime_ns = {
@@ -70,6 +77,7 @@ class CommandMux(Generic[Demand]):
             Source.OUTSIDE: round(config.outside_s * NS_PER_S),
             Source.CONTROLLER: round(config.controller_s * NS_PER_S),
         }
+        self.outside_lifetime_ns = self._lifetime_ns[Source.OUTSIDE]
         self._state_lifetime_ns = round(config.state_s * NS_PER_S)
         self._arrival_ns: dict[Source, int] = {}
         self._demands: dict[Source, Demand] = {}

@@ -12,23 +12,23 @@ path-following in the presence of communication losses and time delays, SIAM J. 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.assignment import assign
 from groundstation.control.controller import NO_NEIGHBOURS
 from groundstation.control.edge import braking_to_count_on
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
-from groundstation.control.planning import plan
 from groundstation.control.safety_filter import SafetyFilterConfig
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, clamp
 from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
-from groundstation.control.trajectories import Margins, Plan, Reconfiguration
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+
+if TYPE_CHECKING:
+    from groundstation.control.trajectories import Plan, Reconfiguration
 
 _MOST_OF_THE_VALVES = 0.6  # that a plan may ask for: the rest fights slope, noise and turning
 _BEGIN_M, _BEGIN_M_S = 0.04, 0.015  # nearer to its start and slower than this, a ship may begin
@@ -74,12 +74,16 @@ class TrajectoryConfig(BaseModel):
     obstacles_m: tuple[tuple[float, float, float], ...] = ()
     station: StationConfig = StationConfig()
 
-    def asked(self, keep_in: KeepIn | None) -> Reconfiguration:
+    def asked(self, keep_in: KeepIn | None) -> "Reconfiguration":
         """What is to be planned; ships in the order of their names in `starts_m`.
 
         Raises:
             ValueError: There are fewer places than ships.
         """
+        # half a second of SciPy, which rigs without a plan need not have
+        from groundstation.control.assignment import assign
+        from groundstation.control.trajectories import Margins, Reconfiguration
+
         cost = "squared_distance" if self.assign == "as_listed" else self.assign
         chosen = assign(  # refuses fewer places, too
             self.starts_m,
@@ -138,6 +142,8 @@ class Trajectory:
                 f"braking_m_s2: {config.braking_m_s2:g} is more than the {braking_m_s2:.3f} m/s2 to count on"
             )
         self._own, self._numbers = config.ship, {name: number for number, name in enumerate(names)}
+        from groundstation.control.planning import plan  # likewise
+
         self._plan = plan(config.asked(keep_in))
         t_s = np.linspace(0.0, self._plan.duration_s, _WAY_SAMPLES)
         self._ways_m = np.moveaxis(self._plan.sampled(t_s), 1, 0)
@@ -146,7 +152,7 @@ class Trajectory:
         self.reset()
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> "Plan":
         """What is flown; ships in the order of their names."""
         return self._plan
 

@@ -53,6 +53,19 @@ class LeaseCheck:
             return ""
         return f"{held_words(lease, now_ns)}; ask for it with take_control"
 
+    def objection_to_commands(self, author: str, now_ns: int) -> str:
+        """Why a program may not command a vehicle now; empty if it may: it must hold the lease."""
+        lease = self._lease
+        if lease is None or not lease.holder:
+            return "nobody holds control: ask for it with take_control"
+        if author != lease.holder:
+            return (
+                f"{held_words(lease, now_ns)}; ask for it with take_control"
+                if now_ns < lease.expires_ns
+                else f"{lease.holder} has not given control back: take it with take_control and force"
+            )
+        return "" if now_ns < lease.expires_ns else "its lease has expired: ask for it with take_control"
+
 
 def held_words(lease: Lease, now_ns: int) -> str:
     """Who holds control, and for how long still, as h:mm:ss."""

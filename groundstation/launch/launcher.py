@@ -55,17 +55,28 @@ class Launcher:
         rig_path: The file.
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
+        hub_port: Of the hub on loopback; 0 for a free one.
 
     Raises:
         RigError: The rig names a laboratory that is not installed.
     """
 
-    def __init__(self, rig: Rig, rig_text: str, rig_path: Path, recording: Path | None, say: Say) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        rig_text: str,
+        rig_path: Path,
+        recording: Path | None,
+        say: Say,
+        *,
+        hub_port: int = 0,
+    ) -> None:
         self._rig_path = rig_path
         self._rig_text = rig_text
         self._files = bytes_of(rig)
         self._recording = recording
         self._say = say
+        self._hub_port = hub_port
         self._addresses: dict[str, Address] | None = None if rig.laboratory is not None else {}
         self._tidings: queue.SimpleQueue[tuple[str, bool]] = queue.SimpleQueue()
         self._children = {name: Child(name) for name in processes_of(rig)}
@@ -91,7 +102,7 @@ class Launcher:
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
-        self.endpoint, self.bus = _open_hub()
+        self.endpoint, self.bus = _open_hub(self._hub_port)
         self.bus.keep_wanted(key_of(Ack.TOPIC, "*"))  # who asks has come just before
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
 
@@ -258,7 +269,9 @@ class Launcher:
             child = self._children[name]
             child.started_s = self._time.now_s
             memory = self._memory.address(has_kept=child.restarts > 0 and child.has_been_ready)
-            child.write(pickle.dumps(Go({**self._addresses, f"{STATION_CHANNEL}memory": memory})))
+            own = {"memory": memory, "hub": self.endpoint}
+            addresses = {f"{STATION_CHANNEL}{name}": address for name, address in own.items()}
+            child.write(pickle.dumps(Go({**self._addresses, **addresses})))
         self._waiting.clear()
 
     def _start_laboratory(self, laboratory: Child) -> None:
@@ -299,11 +312,11 @@ def _raise_refusal(child: Child) -> None:
         raise RigError(child.last_words.removeprefix("groundstation: "))
 
 
-def _open_hub() -> tuple[str, ZenohBus]:
-    """The hub on a free port of loopback.
+def _open_hub(port: int) -> tuple[str, ZenohBus]:
+    """The hub on a port of loopback, on a free one if it is 0.
 
     Raises:
-        GroundStationError: There is no loopback, or somebody took the port in between.
+        GroundStationError: There is no loopback, or somebody has the port.
     """
     try:
         with socket.socket() as probe:
@@ -316,7 +329,7 @@ def _open_hub() -> tuple[str, ZenohBus]:
             f"this machine does not reach itself at 127.0.0.1 ({error.strerror or error}): "
             "is its loopback interface up? (ip link set lo up)"
         ) from error
-    endpoint = f"tcp/127.0.0.1:{address[1]}"
+    endpoint = f"tcp/127.0.0.1:{port or address[1]}"
     with going_first():  # its threads, which pass on everybody's messages
         return endpoint, ZenohBus(endpoint, is_hub=True)
 

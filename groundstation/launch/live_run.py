@@ -39,6 +39,7 @@ class LiveRun:
         rig_path: The file.
         recording: Where the recorder writes.
         watchers: By noun: take the messages of a topic besides, encoded.
+        hub_port: Of the hub on loopback; 0 for a free one.
     """
 
     def __init__(
@@ -48,11 +49,12 @@ class LiveRun:
         rig_path: Path,
         recording: Path,
         watchers: Mapping[str, Callable[[Recorded], None]] = MappingProxyType({}),
+        hub_port: int = 0,
     ) -> None:
         self.rig = rig
         self.recording = recording
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
-        self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note)
+        self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note, hub_port=hub_port)
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
         self._watchers = watchers

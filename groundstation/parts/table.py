@@ -42,6 +42,7 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.imu.part import PART as IMU
     from groundstation.parts.laboratory.part import PART as LABORATORY
     from groundstation.parts.operation.part import PART as OPERATION
+    from groundstation.parts.outside.part import PART as OUTSIDE
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
     from groundstation.parts.scenario.part import PART as SCENARIO
@@ -50,8 +51,8 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.valves.part import PART as VALVES
 
     return (
-        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, SCENARIO, LABORATORY,
-        REFERENCE,
+        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, OUTSIDE, SCENARIO,
+        LABORATORY, REFERENCE,
     )  # fmt: skip
 
 

@@ -106,6 +106,7 @@ class Sightings:
         recorder_ns: Arrival of the recorder's newest status; None where none was ever received.
         recorder_room_s: How long the recording can go on by the room on its disk.
         demand_ns: Arrival of the controller's newest demand; None where none was ever received.
+        outside_trouble: Whose program outside has the vehicle and is silent, and why; empty where none is.
         memory_trouble: Why the memory could not be written; empty if it never failed.
         memory_ns: When that was reported last.
         tick_ns: When the supervisor looked last.
@@ -132,6 +133,7 @@ class Sightings:
     recorder_ns: int | None = None
     recorder_room_s: float = math.inf
     demand_ns: int | None = None
+    outside_trouble: str = ""
     memory_trouble: str = ""
     memory_ns: int = 0
     tick_ns: int | None = None
@@ -293,6 +295,8 @@ class Sightings:
             and self.is_silent(self.demand_ns, CONTROLLER_S, now_ns)
         ):
             yield "controller_silent", _age("demand", self.demand_ns, now_ns)
+        if may_open and self.outside_trouble:
+            yield "outside_silent", self.outside_trouble
 
 
 def _age(what: str, arrival_ns: int | None, now_ns: int) -> str:

@@ -24,7 +24,7 @@ from groundstation.parts.supervision.messages import (
     Supervision,
     ValveShares,
 )
-from groundstation.parts.valves.messages import ValveStatus
+from groundstation.parts.valves.messages import OutsideControl, ValveStatus
 from groundstation.supervision.modes import Event
 from groundstation.supervision.sightings import NodeSeen, Seen
 from groundstation.supervision.supervisor import Ruling, Supervisor
@@ -47,7 +47,7 @@ class SupervisorNode(Node):
 
     inputs = (
         StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveShares, Wrench,
-        Findings, RecorderStatus, Diagnostics,
+        Findings, RecorderStatus, Diagnostics, OutsideControl,
     )  # fmt: skip
     paced = (VehicleState,)
     outputs = (Supervision, Faults, Ack)
@@ -137,6 +137,8 @@ class SupervisorNode(Node):
                 envelope = WrenchEnvelope(self._model, health_of(message.open_ratio, message.shut_ratio))
                 sightings.braking_m_s2 = braking_to_count_on(self._model, envelope)
                 sightings.missing_thrust = envelope.missing
+            case OutsideControl():
+                sightings.outside_trouble = f"{message.author}: {message.reason}" if message.is_silent else ""
             case Findings():
                 sightings.findings = dict(zip(message.ids, message.details, strict=True))
                 sightings.findings_ns = now_ns

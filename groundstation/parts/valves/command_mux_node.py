@@ -18,10 +18,12 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request, answer
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.outside.messages import OutsideWrench
 from groundstation.parts.supervision.messages import Supervision, ValveShares
 from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.hand_push import HandPush
-from groundstation.parts.valves.messages import Outlook, ValveDemand, ValveSelection
+from groundstation.parts.valves.messages import Outlook, OutsideControl, ValveDemand, ValveSelection
+from groundstation.parts.valves.outside_pilot import OutsidePilot
 from groundstation.supervision.clearance import clearance
 from groundstation.supervision.modes import Law
 
@@ -49,9 +51,9 @@ class CommandMuxNode(Node):
         dockings: Pairs that may touch, each inside its corridor.
     """
 
-    inputs = (Wrench, VehicleState, Supervision, ValveShares, Request, Lease)
+    inputs = (Wrench, OutsideWrench, VehicleState, Supervision, ValveShares, Request, Lease)
     paced = (VehicleState,)
-    outputs = (ValveDemand, ValveSelection, Outlook, Ack)
+    outputs = (ValveDemand, ValveSelection, OutsideControl, Outlook, Ack)
     trigger = Wrench
 
     def __init__(
@@ -76,6 +78,7 @@ class CommandMuxNode(Node):
         self._period_ns = round(modulator.config.period_s * 1e9)
         self._due_ns: int  # since the source changed, from none to closed at first
         self._hand = HandPush(self._period_ns)
+        self._outside = OutsidePilot(vehicle, choice, self._period_ns)
         self._ruling: Supervision | None = None
         self._ruling_ns: int  # of the ruling
         self._lease = LeaseCheck()
@@ -94,6 +97,11 @@ class CommandMuxNode(Node):
                 wrench = BodyWrench((message.force_x_n, message.force_y_n), message.torque_z_nm)
                 self._choice.control(wrench, now_ns)
                 yield from self._select(now_ns)
+            case OutsideWrench():
+                objection = self._lease.objection_to_commands(message.author, now_ns)
+                yield from self._outside.take(message, objection, self._law(now_ns), now_ns)
+                if self._outside.offer(self._law(now_ns), now_ns):
+                    yield from self._select(now_ns)
             case VehicleState():
                 self._see(message, now_ns)
             case Supervision():
@@ -103,8 +111,10 @@ class CommandMuxNode(Node):
                 self._braking.envelope = self._modulator.envelope
             case Lease():
                 self._lease.take(message)
+                self._outside.follow_lease(message.holder)
             case Request(action="resume") if not self._lease.objection(message, now_ns):
                 self._hand.end()
+                self._outside.give_back(f"resumed by {message.author}", now_ns)
             case Request() if message.action == PUSH.name:
                 refusal = self._lease.objection(message, now_ns)
                 refusal = refusal or self._hand.begin(message, self._ruling, now_ns)
@@ -116,7 +126,9 @@ class CommandMuxNode(Node):
         push, is_over = self._hand.due(now_ns)
         if push is not None or is_over:
             self._choice.operate(push or NO_WRENCH, now_ns)
+        self._outside.offer(self._law(now_ns), now_ns)
         yield from self._select(now_ns)
+        yield from self._outside.report(now_ns)
         self._ticks += 1
         if self._ticks % OUTLOOK_EVERY == 0 and self._braking.state is not None:
             yield self._look_ahead(self._braking.state, now_ns)
@@ -141,13 +153,19 @@ class CommandMuxNode(Node):
         if before is None or before.law != ruling.law:
             self._hand.end()
             self._choice.forget()
+            self._outside.follow_law(self._law(now_ns), now_ns)
             yield from self._select(now_ns)
 
-    def _choose(self, now_ns: int) -> Selection[BodyWrench]:
+    def _law(self, now_ns: int) -> Law | None:
+        """What the supervisor rules; None where nothing comes from it."""
         ruling = self._ruling
-        if ruling is None or now_ns - self._ruling_ns > RULING_NS:
+        return None if ruling is None or now_ns - self._ruling_ns > RULING_NS else Law(ruling.law)
+
+    def _choose(self, now_ns: int) -> Selection[BodyWrench]:
+        ruling, law = self._ruling, self._law(now_ns)
+        if ruling is None or law is None:
             return Selection(Source.CLOSED, None, False, "nothing comes from the supervisor")
-        match ruling.law:
+        match law:
             case Law.CONTROLLER:
                 return self._choice.select(now_ns)
             case Law.BRAKE:

@@ -57,6 +57,23 @@ class ValveSelection(Message):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class OutsideControl(Message):
+    """Which program outside the station has the vehicle; latched, published when that changes.
+
+    Attributes:
+        author: Whose program; empty while the controller has it.
+        is_silent: Nothing that counts comes from it: the vehicle brakes and waits.
+        reason: Why it has the vehicle no more, or why it counts as silent.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/OutsideControl"
+    TOPIC: ClassVar = Topic("outside_control", rank=Rank.VALVES, latched=True)
+    author: Text
+    is_silent: Bool
+    reason: Text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Outlook(Message):
     """Whether the mock-up can still stop, ten times a second while it flies.
 

@@ -23,6 +23,7 @@ from groundstation.parts.valves.messages import (
     CanIn,
     CanOut,
     Outlook,
+    OutsideControl,
     ValveCommand,
     ValveDemand,
     ValveSelection,
@@ -103,7 +104,7 @@ def _check(rig: Rig) -> None:
 PART = Part(
     name="valves",
     summary="one wrench is chosen, filtered for safety, made into pulses, guarded and sent over the bus",
-    topics=(CanIn, ValveStatus, ValveDemand, ValveSelection, Outlook, ValveCommand, CanOut),
+    topics=(CanIn, ValveStatus, ValveDemand, ValveSelection, Outlook, OutsideControl, ValveCommand, CanOut),
     nodes=(
         NodeRow("command_mux", COMMANDS, Weight.URGENT, CommandMuxNode, _command_mux),
         NodeRow("guard", COMMANDS, Weight.URGENT, GuardNode, _guard),

@@ -82,6 +82,11 @@ class TestSilence:
         assert found(known) == {"controller_silent": "no demand was ever received"}
         assert found(known, may_open=False) == {}
 
+    def test_a_program_outside_is_missed_where_valves_may_open(self, known):
+        known.outside_trouble = "anna: no wrench for 250 ms"
+        assert found(known) == {"outside_silent": "anna: no wrench for 250 ms"}
+        assert found(known, may_open=False) == {}
+
     def test_a_recorder_is_missed_only_where_there_was_one(self, known):
         assert found(known) == {}
         known.recorder_ns = 18 * S

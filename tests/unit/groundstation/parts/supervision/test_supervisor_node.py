@@ -21,7 +21,7 @@ from groundstation.parts.supervision.messages import (
     ValveShares,
 )
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
-from groundstation.parts.valves.messages import ValveStatus
+from groundstation.parts.valves.messages import OutsideControl, ValveStatus
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
 
@@ -340,3 +340,10 @@ class TestFaults:
 
 def test_its_period(node):
     assert node.node.tick_period_ns == 20 * MS
+
+
+def test_it_follows_who_flies_it_from_outside_and_whether_he_is_silent():
+    driven = Driven()
+    for is_silent, trouble in ((False, ""), (True, "anna: no wrench for 250 ms"), (False, "")):
+        assert driven.receive(OutsideControl(0, "alpha", "anna", is_silent, "no wrench for 250 ms")) == []
+        assert driven.known.outside_trouble == trouble

@@ -27,6 +27,7 @@ from groundstation.declarations.lease import Lease
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.outside.messages import OutsideWrench
 from groundstation.parts.supervision.messages import Supervision, ValveShares
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.hand_push import HandPush
@@ -59,9 +60,11 @@ def own(sigma_m, position=(0.0, 0.0)):
 
 
 def test_who_is_heard(mux):
-    assert CommandMuxNode.inputs == (Wrench, VehicleState, Supervision, ValveShares, Request, Lease)
+    assert CommandMuxNode.inputs == (
+        Wrench, OutsideWrench, VehicleState, Supervision, ValveShares, Request, Lease,
+    )  # fmt: skip
     assert mux.sources(VehicleState) == ("alpha", "beta")
-    for kind in (Wrench, Supervision, ValveShares, Request, Lease):
+    for kind in (Wrench, OutsideWrench, Supervision, ValveShares, Request, Lease):
         assert mux.sources(kind) == ("alpha",)
 
 

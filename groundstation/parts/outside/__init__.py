@@ -1,0 +1,1 @@
+"""Programs outside the station that command a vehicle: their texts in, wrenches and requests of ours out."""
