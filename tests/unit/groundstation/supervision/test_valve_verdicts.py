@@ -29,9 +29,21 @@ def fit(air):
 
 
 def block(opened=(), turned=(), edges=(), ends=(), span_s=0.02):
-    rows = [dict(each) for each in (opened, turned, ends, edges)]
+    by_valve = {
+        name: [dict(row).get(valve, 0.0) for valve in range(8)]
+        for name, row in {"open_shares": opened, "rate_shares": turned, "edges": edges, "ends": ends}.items()
+    }
+    # neither a trial nor an inquiry takes notice of sag, crowds and turned_s
+    none = [0.0] * 8
     return Block(
-        span_s, 0.0, (0.0, 0.0), *([row.get(valve, 0.0) for valve in range(8)] for row in rows), False
+        span_s=span_s,
+        rate_rad_s=0.0,
+        force_m_s2=(0.0, 0.0),
+        sagged_shares=by_valve["open_shares"],
+        crowds=none,
+        turned_s=none,
+        is_after_gap=False,
+        **by_valve,
     )
 
 
@@ -55,6 +67,7 @@ class TestVerdict:
     def test_of_those_that_cannot_be_told_apart_nothing_is_known(self):
         assert Verdict(one(), (one(valve=1),), False).health() == {}
         assert Verdict(one(Kind.SUPPLY, -1), (), False).health() == {}
+        assert Verdict(one(Kind.OPEN, is_steady=False), (), False).health() == {}
         assert list(Verdict(one(valve=0), (), False).health()) == [0]
 
     @pytest.mark.parametrize(
@@ -214,7 +227,8 @@ class TestTrial:
         whole = 0.5 * fit.sizes[0] ** 2 / 1e-6
         rows = [(number, block({0: 1.0}), gone) for number in (1, 2)]
         for marks, witness, is_twice in [
-            ([1], 0.99 * whole, True), ([1], 1.01 * whole, False), ([2], 0.5 * whole, False), ([], 1.0, False),
+            ([1], 0.99 * whole, True), ([1], 1.01 * whole, False),
+            ([2], 0.5 * whole, False), ([], 1.0, False),
         ]:  # fmt: skip
             trial = ValveTrial(fit, rows, [1], marks, witness)
             found = next(
