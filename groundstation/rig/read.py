@@ -53,13 +53,15 @@ def read_text(path: Path, what: str = "rig file") -> str:
         RigError: There is no such file, or it is no text.
     """
     try:
-        return text_of(path.read_bytes(), path)
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise RigError(f"{path}: there is no such {what}") from error
     except OSError as error:
         raise RigError(f"{path}: cannot be read as a {what} ({error.strerror})") from error
     except ValueError as error:  # a NUL in the name
         raise RigError(f"{str(path)!r}: cannot be read as a {what} ({error})") from error
+    try:
+        return text_of(content, path)
     except FileError as error:
         raise RigError(str(error)) from error
 
