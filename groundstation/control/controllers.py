@@ -20,6 +20,7 @@ from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.path import PathConfig, PathFollowing
 from groundstation.control.station import StationConfig, StationKeeping
+from groundstation.control.tumble import Tumble, TumbleConfig
 from groundstation.control.vehicle import VehicleModel
 
 ENTRY_POINT_GROUP = "groundstation.controllers"
@@ -84,10 +85,17 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             lambda config: tuple(config.neighbours),
         ),
         "path": ControllerRow(
-            "follow waypoints, once or round and round",
+            "follow waypoints, the perimeter or a figure eight",
             PathConfig,
             PathFollowing,
             {"waypoints_m": ((0.3, 0.0), (0.3, 0.3))},
+            has_program=True,
+        ),
+        "tumble": ControllerRow(
+            "play a target that nobody controls: it turns and drifts",
+            TumbleConfig,
+            Tumble,
+            {"mode": "free", "span_s": 20.0},
             has_program=True,
         ),
         "follow": ControllerRow(

@@ -89,5 +89,7 @@ def test_a_misspelt_setting_is_named(name):
 
 
 def test_an_unknown_controller_is_answered_with_the_known_ones():
-    with pytest.raises(ValueError, match=r"'hover'; there are follow, formation, go_to, path, station"):
+    with pytest.raises(
+        ValueError, match=r"'hover'; there are follow, formation, go_to, path, station, tumble"
+    ):
         make_controller("hover", {}, VEHICLE)
