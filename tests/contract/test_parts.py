@@ -237,7 +237,7 @@ def with_control(place, **control):
         (
             {"controller": "hoover"},
             "{}.control: controller 'hoover' is none of dock, follow, formation, go_to, path, station, "
-            "trajectory, turn",
+            "trajectory, tumble",
         ),
         (
             {"controller": "go_to", "parameters": {"speeed_m_s": 0.1}},
