@@ -108,6 +108,8 @@ def test_a_wrong_rig_is_refused_in_one_sentence(what, tmp_path, capsys):
         (["nowhere.toml"], "nowhere.toml: there is no such scenario or rig file"),
         ([RIGS / "drawn_fixes.toml", "--lockstep"], "--lockstep needs --duration"),
         ([RIGS / "drawn_fixes.toml", "--seed", "3"], "--seed goes with --lockstep"),
+        ([RIGS / "drawn_fixes.toml", "--lockstep", "--hub-port", "7447"], "--hub-port goes with real time"),
+        ([RIGS.parent / "scenarios" / "go_to.toml", "--hub-port", "7447"], "--hub-port goes with a rig"),
         ([RIGS / "drawn_fixes.toml", "--record", RECORDED], "never overwritten"),
         ([RIGS / "drawn_fixes.toml", "--record", "noend"], "noend must end in .mcap"),
         ([RIGS / "drawn_fixes.toml", "--record", "run.MCAP"], "run.MCAP must end in .mcap"),
