@@ -10,7 +10,7 @@ from groundstation.bus.record_stream import Recorded
 from groundstation.cli.live_view import run_live
 from groundstation.cli.run_files import finished_files
 from groundstation.cli.run_progress import RunProgress
-from groundstation.declarations.errors import GroundStationError, NodeError, UsageError
+from groundstation.declarations.errors import GroundStationError, NodeError, RigError, UsageError
 from groundstation.files.writing import check_folder
 from groundstation.launch.live_run import LiveRun
 from groundstation.parts.scenario.messages import FAILED, RUNNING, WAITING, Marker, ScenarioStatus
@@ -19,7 +19,7 @@ from groundstation.recording.writer import check_new_recording
 from groundstation.rig.read import load_rig, source_of
 from groundstation.scenario.judging import Judged, sentence
 from groundstation.scenario.loading import Scenario, rig_text
-from groundstation.scenario.rehearsal import check_dispersions, check_failures, rehearse
+from groundstation.scenario.rehearsal import check_dispersions, check_failures, rehearse, twin_of
 from groundstation.scenario.running import fly_recorded, judge_recordings, longest_s, seed_for
 from groundstation.watch.verdict import PASSED
 
@@ -82,6 +82,10 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
 def _on_hardware(scenario: Scenario, asked: Asked, path: Path) -> Scenario:
     """The scenario on the hardware, once its twin has flown it."""
     hardware = load_rig(path)
+    try:
+        twin_of(hardware)
+    except RigError as error:
+        raise UsageError(f"{path}: {error}") from error
     on_hardware = scenario.on_hardware(hardware)
     with RunProgress(longest_s(scenario)) as progress:
         refusal = rehearse(scenario, hardware, asked.seed, progress)

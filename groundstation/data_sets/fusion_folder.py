@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.data_sets.known_block import read_known
 from groundstation.data_sets.stamp_words import (
     complaint_about_bunches,
     complaint_about_fixes,
@@ -24,10 +25,7 @@ from groundstation.data_sets.value_words import (
     without_wild_temperatures,
 )
 from groundstation.files.errors import FileError
-from groundstation.files.json_file import parse_json
 from groundstation.files.number_tables import load_table
-from groundstation.files.reading import read_bytes
-from groundstation.files.values import number, numbers
 from groundstation.fusion.flight_data import FlightData
 from groundstation.fusion.noise import (
     GYRO_BIAS_WALK_RAD_S_RTS,
@@ -39,18 +37,11 @@ from groundstation.fusion.noise import (
 
 IMU_COLUMNS = ("t_s", "omega_rad_s", "ax_m_s2", "ay_m_s2", "temperature_C")
 STAR_COLUMNS = ("t_exposure_s", "t_arrival_s", "x_m", "y_m", "heading_rad")
-POSITIVE_KEYS = (
-    "duration_s", "imu_rate_hz", "poll_rate_hz", "star_sigma_xy_m", "star_sigma_heading_rad",
-)  # fmt: skip
 FIX_TIME_POLLS = 1.0
 """How well an exposure's stamp can be laid on the packets: nothing happens between two polls of the sensors.
 Data sets do not give it; live, the clock's own sigma goes into each fix's covariance instead."""
 FIX_DELAY_POLLS = 0.5
 """The constant part of it: what the best calibration of a camera's delay leaves."""
-OTHER_KEYS = (
-    "run_start_s", "imu_offset_sigma_m", "gyro_noise_poll_rad_s", "acc_noise_poll_m_s2", "gyro_lsb_rad_s",
-    "acc_lsb_m_s2", "gyro_tempco_rad_s_C", "acc_tempco_m_s2_C", "gyro_bandwidth_hz", "acc_bandwidth_hz",
-)  # fmt: skip
 
 
 def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
@@ -119,26 +110,3 @@ def noise_of(known: dict[str, Any]) -> NoiseModel:
         gyro_lag_s=lag_of_bandwidth(known["gyro_bandwidth_hz"]),
         acc_lag_s=lag_of_bandwidth(known["acc_bandwidth_hz"]),
     )
-
-
-def read_known(path: Path) -> dict[str, Any]:
-    """Read and check the `known` block of a meta.json.
-
-    Raises:
-        FileError: a key is missing or wrong.
-    """
-    meta = parse_json(read_bytes(path), path)
-    known = meta.get("known")
-    if not isinstance(known, dict):
-        raise FileError(f'{path}: has no block "known".')
-    try:
-        for key in (*POSITIVE_KEYS, *OTHER_KEYS):
-            if number(known, key, f"known.{key}") <= 0.0 and key in POSITIVE_KEYS:
-                raise ValueError(f"known.{key} must be above zero, found {known[key]!r}")
-        numbers(known, "imu_offset_m", 2, "known.imu_offset_m")
-    except ValueError as error:
-        raise FileError(f"{path}: {error}.") from error
-    for noise, lsb in (("gyro_noise_poll_rad_s", "gyro_lsb_rad_s"), ("acc_noise_poll_m_s2", "acc_lsb_m_s2")):
-        if min(known[noise], known[lsb]) < 0.0 or known[noise] + known[lsb] == 0.0:
-            raise FileError(f"{path}: known.{noise} and known.{lsb} must not be negative nor both zero.")
-    return known

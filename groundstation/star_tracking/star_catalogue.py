@@ -14,6 +14,8 @@ from groundstation.star_tracking.camera_model import CameraCalibration
 
 MIN_STARS = 4
 """Below this no frame could be identified without a prior."""
+MOST_STARS = 5000
+"""With more the tables over the sky take minutes and gigabytes, and no ceiling has so many lights."""
 
 _PLACE, _SPREAD = ("x_m", "y_m"), ("std_x_m", "std_y_m")
 FARTHEST_M = 100.0
@@ -45,6 +47,8 @@ class StarCatalogue:
             raise ValueError("ids, x_m, y_m and sigma_m must have one entry per star")
         if n < MIN_STARS:
             raise ValueError(f"a catalogue needs at least {MIN_STARS} stars, this one has {n}")
+        if n > MOST_STARS:
+            raise ValueError(f"a catalogue may have {MOST_STARS} stars at most, this one has {n}")
         flaw = _flaw(self.ids, self.x_m, self.y_m, self.sigma_m)
         if flaw is not None:
             raise ValueError(flaw[1])
@@ -109,6 +113,11 @@ class StarCatalogue:
             unique=("id",),
             most=dict.fromkeys(_PLACE, FARTHEST_M) | dict.fromkeys(_SPREAD, _LARGEST_SIGMA_M),
         )
+        if len(table.numbers) > MOST_STARS:
+            raise FileError(
+                f"{path}: lists {len(table.numbers)} stars, expected {MOST_STARS} at most: keep those that "
+                "the camera can see."
+            )
         for row in np.flatnonzero((table.numbers[:, len(_PLACE) :] < 0.0).any(axis=1)):
             raise FileError(f"{path}: line {table.lines[row]}: a standard deviation is below zero.")
         x_m, y_m, *spread = (column.copy() for column in table.numbers.T)

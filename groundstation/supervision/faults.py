@@ -79,6 +79,8 @@ class Fault:
 
 CLEAR_S = 1.0
 """So long a fault that clears by itself must not have been seen."""
+LATEST_OUTAGE_S = 2.7
+"""With 1.5 fixes a second that are 0.6 s late: three intervals after the last one came. With 15: 0.5 s."""
 _NOTE, _HOLD, _LAND, _CUT = Response.NOTE, Response.HOLD, Response.LAND, Response.CUT
 _ITSELF, _PERSON = Clears.ITSELF, Clears.PERSON
 
@@ -87,7 +89,7 @@ FAULTS: Mapping[str, Fault] = {
     for row in (
         # -- where it is ----------------------------------------------------------------------------
         Fault("star_outage", "No fix places it: it flies on dead reckoning.",
-              "no fix used for three periods of its source and its delay", 1.0,
+              "no fix used for three of its usual intervals, 0.5 s at least", LATEST_OUTAGE_S,
               ((0.0, _NOTE), (20.0, _LAND)), _ITSELF, True, False,
               "Look at the lights and at the camera.", ("dead_sky", "silent_camera")),
         Fault("position_uncertain", "Dead reckoning has become too uncertain.",

@@ -30,6 +30,12 @@ _LONGEST_PUSH_BLOCKS = 50
 """After a shock valves are not accused while forces go on, but not for longer than this."""
 _IS_CONSTANT = 0.95
 
+LARGEST_STEP_M_S2 = 0.08
+"""What a zero of the accelerometers can step by: 0.3 deg, the drift of the data sheet over the whole range of
+temperatures, and half as much again. A hand pushes harder."""
+_CARRIED_M = 1.0
+"""What is larger was no hand once that hand would have carried the mock-up so far: it is a broken sensor."""
+
 _evidence = attrgetter("evidence")
 LEAST_PUSH_M_S = 0.3e-3
 """In a block; less than a valve gives is explained by a clock that is off, and harms nobody."""
@@ -50,7 +56,8 @@ class ValveConsistencyConfig:
         false_alarm_chance: Of any false alarm in `over_s` of flight.
         over_s: See there.
         wait_s: How long to wait for more evidence when two valves could explain it.
-        shift_s: A force without torque that lasts as long is a shifted accelerometer.
+        shift_s: A force without torque that lasts as long is a shifted accelerometer, if it is no
+            larger than its zero can step by.
     """
 
     fit: FitConfig
@@ -175,7 +182,7 @@ class ValveConsistency:
         if self._calm_after:
             self._calm_after -= 1
             self._pushed_blocks += 1
-            if odd and self._pushed_blocks < _LONGEST_PUSH_BLOCKS:
+            if odd and (self._pushed_blocks < _LONGEST_PUSH_BLOCKS or self._is_hand()):
                 self._calm_after = max(self._calm_after, _CALM_BLOCKS // 2)
             self._fit.lose_rate()
             return
@@ -241,12 +248,13 @@ class ValveConsistency:
         self._odd_blocks += 1
         self._odd_x, self._odd_y = self._odd_x + x, self._odd_y + y
         self._odd_square += x * x + y * y
-        count = self._odd_blocks
-        if count * block.span_s < self._config.shift_s or self._shifted or self._valve_findings:
+        lasted_s = self._odd_blocks * block.span_s
+        if lasted_s < self._config.shift_s or self._shifted or self._valve_findings:
             return
-        if (self._odd_x**2 + self._odd_y**2) < _IS_CONSTANT * count * self._odd_square:
+        mean, is_constant = self._odd_force()
+        size = math.hypot(*mean)
+        if not is_constant or (size > LARGEST_STEP_M_S2 and 0.5 * size * lasted_s**2 < _CARRIED_M):
             return
-        mean = (self._odd_x / count, self._odd_y / count)
         detail = (
             f"accelerometers read ({1e3 * mean[0]:.0f}, {1e3 * mean[1]:.0f}) mm/s^2 that no valve explains: "
             "their zero moved, or a steady push"
@@ -255,3 +263,13 @@ class ValveConsistency:
         self._fit.shift_zero(mean)
         self._suspicions.drop()
         self._inquiry.forget()
+
+    def _odd_force(self) -> tuple[tuple[float, float], bool]:
+        """Mean of the force that no valve explains, since it began, and whether it stayed the same."""
+        count, x, y = self._odd_blocks, self._odd_x, self._odd_y
+        return (x / count, y / count), x * x + y * y >= _IS_CONSTANT * count * self._odd_square
+
+    def _is_hand(self) -> bool:
+        """Whether a force goes on that is the same all the time, and larger than a zero's step."""
+        mean, is_constant = self._odd_force()
+        return is_constant and math.hypot(*mean) > LARGEST_STEP_M_S2

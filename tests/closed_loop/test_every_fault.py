@@ -14,6 +14,9 @@ PROMISES = ("left_table", "hit_neighbour", "floated_unarmed", "open_when_disarme
 MAY_GO_UNSEEN = {"leaking_valve"}
 """A small leak may look like the slope of the table for a while."""
 
+WITH_QUICK_FIXES_S = {"star_outage": 1.0}
+"""Its row says what holds for the slowest rig; here 15 fixes come a second."""
+
 
 @pytest.mark.slow
 def test_every_fault_is_found_and_breaks_no_promise(tmp_path):
@@ -29,5 +32,6 @@ def test_every_fault_is_found_and_breaks_no_promise(tmp_path):
         if row["failure"] == "healthy":
             assert row["others"] == [], row
         elif row["failure"] not in MAY_GO_UNSEEN:
-            longest_s = max(fault.within_s for fault in FAULTS.values() if row["failure"] in fault.failures)
+            found = [fault for fault in FAULTS.values() if row["failure"] in fault.failures]
+            longest_s = max(WITH_QUICK_FIXES_S.get(fault.id, fault.within_s) for fault in found)
             assert row["found_after_s"] < 2.0 + longest_s, row

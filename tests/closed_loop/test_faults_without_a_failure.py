@@ -42,6 +42,21 @@ def test_a_vehicle_that_a_hand_pushes_to_the_edge_brakes_before_it(fly):
     assert flight.modes()[-1] != "landed"
 
 
+@pytest.mark.parametrize(("newtons", "span_s"), [(1.6, 0.8), (1.6, 1.2), (2.4, 0.9)])
+def test_a_hand_that_pushes_steadily_shifts_no_sensor(fly, newtons, span_s):
+    flight = fly(failure("pushed", span_s, force_x_n=newtons, force_y_n=0.3)).run(START_S + 8.0)
+    assert first_s(flight, "pushed") < 0.5
+    assert not flight.faults() & {"imu_shifted", "valve_stuck_open", "valve_stuck_closed", "valve_weak"}
+    assert flight.modes()[-1] in {"flying", "holding"}
+
+
+def test_an_imu_that_turns_faster_than_it_can_read_is_not_believed_and_the_air_is_cut(fly):
+    flight = fly(failure("pushed", 3.0, torque_nm=3.0)).run(START_S + 5.0)
+    assert first_s(flight, "imu_implausible") < 3.0  # half a second after the gyro's end of range
+    assert flight.modes()[-1] in {"landed", "resting"}
+    assert not flight.of(ValveStatus)[-1].floating
+
+
 def test_what_cannot_stop_before_the_edge_gets_its_air_cut(fly):
     flight = fly(failure("pushed", 1.5, force_x_n=6.0)).run(14.0)
     assert first_s(flight, "edge_unavoidable") < 2.0

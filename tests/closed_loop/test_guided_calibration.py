@@ -5,6 +5,12 @@ import pytest
 from calibration import wizards
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.supervision.messages import Supervision
+from groundstation.recording.info import RecordingInfo
+from groundstation.recording.reader import Recording
+from groundstation.recording.writer import Recorder
+from groundstation.rig.plan import make_node
+from groundstation.runners.make_runner import make_runner
+from groundstation.runners.replay import ReplayRunner
 
 LONGEST_S = 400
 SCALE_ERROR = 0.006  # with twice as much the supervisor takes turns for a zero that moved, and lands
@@ -159,3 +165,29 @@ def test_rest_is_what_is_without_a_break(lead):
     assert advice[-1].step.is_rest
     assert advice[-1].done < before.done < 1.0
     assert not node.is_done  # who drives it himself may
+
+
+def test_a_flight_that_is_led_replays_bit_for_bit(fly, tmp_path):
+    path = tmp_path / "led.mcap"
+    rig = fly(changes=CHANGES).rig
+    guide = wizards.load_wizard("imu").begin(rig, "alpha")
+    node = wizards.GuideNode("alpha", guide, lambda _: None, "test")
+    asked = []
+
+    def note(delivered, _):
+        if isinstance(delivered.payload, Request):
+            asked.append(delivered.payload.action)
+
+    with Recorder(path, RecordingInfo()) as recorder:
+        runner = make_runner(rig, 1, [recorder.record, note], extra_nodes=[node])
+        while asked.count("go_to") < 2 and runner.now_ns < 90e9:
+            runner.run(500_000_000)
+        runner.close()
+    assert asked[:3] == ["land", "fly", "go_to"]
+    with Recording(path) as recording:
+        report = ReplayRunner(recording, lambda key: make_node(rig, key)).run()
+    assert report.agrees
+    assert not report.missing_inputs
+    nouns = {result.noun: result.equal for result in report.results}
+    assert nouns["supervision"] > 300
+    assert nouns["ack"] >= 4

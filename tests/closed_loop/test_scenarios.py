@@ -231,6 +231,12 @@ def test_hardware_without_a_twin_is_refused(file, tmp_path):
         rehearse(scenario.load(file(SHORT)), load_rig(hardware(tmp_path, None)))
 
 
+def test_the_refusal_names_the_rig_without_a_twin(file, tmp_path, capsys):
+    rig = hardware(tmp_path, None)
+    assert call(["run", str(file(SHORT)), "--hardware", str(rig)]) == 2
+    assert f"{rig}: the rig names no emulated twin" in capsys.readouterr().err
+
+
 def test_the_dry_run_lets_pass_what_goes_well_on_the_twin(file, tmp_path):
     plan = scenario.load(file(SHORT))
     rig = load_rig(hardware(tmp_path, RIG.as_posix()))

@@ -9,7 +9,7 @@ import pytest
 
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.sky.scene import read_camera
-from groundstation.data_sets.fusion_folder import read_known
+from groundstation.data_sets.known_block import read_known
 from groundstation.files.errors import FileError
 from groundstation.fusion.constants_file import read_constants
 from groundstation.fusion.table_map import MapProvenance, TableMap

@@ -1,5 +1,6 @@
 """The parts of ``make bench`` that can be wrong without anybody seeing it in the table."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -54,3 +55,21 @@ def test_the_lock_of_the_benches_pins_the_same_releases_as_the_lock_of_the_tests
 
 def test_the_unit_takes_time(bench):
     assert 0.0 < bench("unit").reference_unit_s() < 10.0
+
+
+@pytest.mark.parametrize(
+    ("flights", "alarms", "shown", "ok"),
+    [(0, [], "0, too little was flown", None), (30, [], "0, too little was flown", None),
+     (60, [], "0", True), (1, ["pushed"], "1", False)],
+)  # fmt: skip
+def test_healthy_flights_that_were_not_flown_show_nothing(
+    bench, monkeypatch, tmp_path, flights, alarms, shown, ok
+):
+    module = bench("fault_flights")
+    monkeypatch.setattr(module, "FLIGHTS", tmp_path / "none.jsonl")
+    monkeypatch.setattr(module, "HEALTHY", tmp_path / "healthy.jsonl")
+    row = {"start_s": 10.0, "false_alarms": alarms, "others": []}
+    module.HEALTHY.write_text(f"{json.dumps(row)}\n" * flights)
+    *promises, healthy = module.measure(None)
+    assert all(promise.ok is None for promise in promises)
+    assert (healthy.measured, healthy.ok) == (shown, ok)

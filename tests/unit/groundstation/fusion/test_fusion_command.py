@@ -98,13 +98,18 @@ def test_an_empty_file_is_refused(folder, tmp_path, content):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("imu_rate_hz", None), ("imu_rate_hz", 0.0), ("imu_offset_m", [1.0]), ("acc_lsb_m_s2", "x")],
-)
+    [("imu_rate_hz", None), ("imu_rate_hz", 0.0), ("imu_offset_m", [1.0]), ("acc_lsb_m_s2", "x"),
+     ("star_delay_s", 600.0), ("mass_kg", 1e300), ("mass_kg", "11"), ("imu_offset_m", [31.51, -21.22]),
+     ("imu_offset_m", [0.0, -50.0]), ("run_start_s", 1e9), ("run_start_s", -1.0), ("duration_s", 1e300),
+     ("star_sigma_heading_rad", 50.0), ("star_sigma_xy_m", 1e-300), ("gyro_bandwidth_hz", -40.0)],
+)  # fmt: skip
 def test_a_wrong_key_is_named(folder, tmp_path, key, value):
     meta = json.loads((folder / "meta.json").read_text())
     meta["known"][key] = value
     (folder / "meta.json").write_text(json.dumps(meta))
-    assert f"known.{key}" in refusal(folder, "--out", tmp_path / "e.csv")
+    message = refusal(folder, "--out", tmp_path / "e.csv")
+    assert f"known.{key} " in message
+    assert "expected" in message or "missing" in message or "must be" in message
 
 
 def test_meta_that_is_no_json_is_refused_with_its_line(folder, tmp_path):

@@ -8,7 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.fusion import app
+from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.files.errors import FileError
+from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimator import Fix, ImuPacket
 
 ROW = 2000
 """In flight."""
@@ -97,6 +100,53 @@ def test_a_clock_that_is_set_back_is_counted_on(flight, both):
     flight.run()
     assert f"line {ROW + 2}, the clock is set back by 9.9" in flight.output
     assert np.nanmax(flight.error_m) < 0.007
+
+
+@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize("off_s", [100.0, -100.0, 5.0])
+def test_an_island_of_stamps_costs_its_packets_and_no_fix(flight, off_s, both):
+    rows = slice(ROW, ROW + 30)
+    span_s = flight.imu[rows.start, 0], flight.imu[rows.stop, 0]
+    flight.imu[rows, 0] += off_s
+    if both:
+        arrives_s = flight.stars[:, 1]
+        flight.stars[(span_s[0] <= arrives_s) & (arrives_s < span_s[1]), :2] += off_s
+    flight.run()
+    assert f"30 of {len(flight.imu)} packets set aside" in flight.output
+    assert "the clock is set back" not in flight.output
+    used = np.genfromtxt(flight.folder / "fixes.csv", delimiter=",", names=True)["used"]
+    assert used.sum() >= len(flight.stars) - 3
+    known = np.isfinite(flight.error_m)
+    assert (flight.error_m[known] < 4.0 * flight.sigma_m[known]).all()
+    assert flight.error_m[ROW + 200 : -2].max() < 0.012
+
+
+@pytest.mark.parametrize("off_s", [100.0, -100.0])
+def test_live_an_island_is_told_and_the_fixes_that_follow_are_used(flight, off_s):
+    data = read_folder(flight.folder)
+    stamps_s = data.imu[:, 0].copy()
+    stamps_s[ROW : ROW + 30] += off_s
+    estimator = ErrorStateFilter(data.noise)
+    estimator.begin_rest(0)
+    fixes = sorted(zip(data.stars.tolist(), data.covariance, strict=True), key=lambda fix: fix[0][1])
+    states, used, resting = [], 0, True
+    for stamp_s, (true_s, *readings) in zip(stamps_s, data.imu.tolist(), strict=True):
+        while fixes and fixes[0][0][1] <= true_s:
+            (exposure_s, arrival_s, *pose), covariance = fixes.pop(0)
+            used += estimator.add_fix(
+                Fix(round(exposure_s * 1e9), round(arrival_s * 1e9), *pose, covariance)
+            ).used
+        if resting and true_s > data.run_start_s:
+            estimator.end_rest(round(data.run_start_s * 1e9))
+            resting = False
+        states.append(estimator.add_imu(ImuPacket(round(stamp_s * 1e9), 0.01, *readings)))
+    used += sum(account.used for account in estimator.settled())
+    lost = [state is None or state.is_lost for state in states]
+    assert any(lost[ROW : ROW + 300])
+    assert not any(lost[ROW + 400 :])
+    assert used >= len(data.stars) - 3
+    true = flight.truth["x_m"][-1], flight.truth["y_m"][-1]
+    assert np.hypot(states[-1].x_m - true[0], states[-1].y_m - true[1]) < 0.007
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "milli"), (1e6, "micro"), (1e9, "nano")])

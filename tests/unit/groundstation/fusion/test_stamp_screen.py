@@ -80,6 +80,41 @@ def test_many_wild_stamps_are_all_found(clock):
     assert set(np.flatnonzero(~kept(found))) == set(rows)
 
 
+@pytest.mark.parametrize("off_s", [100.0, -100.0, 8.0, -8.0, 1e6, -1e9])
+@pytest.mark.parametrize("rows", [3, 21, 30, 300])
+@pytest.mark.parametrize("at", [400, 1500, 2600])
+def test_an_island_of_stamps_that_goes_back_is_set_aside_alone(clock, off_s, rows, at):
+    given = clock.copy()
+    given[at : at + rows] += off_s
+    found = screen_stamps(given, PERIOD_S)
+    want = np.ones(N, bool)
+    want[at : at + rows] = False
+    np.testing.assert_array_equal(kept(found), want)
+    np.testing.assert_array_equal(found.stamp_s[want], clock[want])
+    assert len(found.aside[FAR]) == rows
+    assert not found.set_back
+
+
+def test_islands_with_wild_stamps_in_them_and_losses_around_them_are_set_aside(clock):
+    given = clock.copy()
+    given[500:530] += 100.0
+    given[510] = -7e4
+    given[2000:2040] -= 100.0
+    given = np.delete(given, [499, 515, 516, 530, 2040])
+    found = screen_stamps(given, PERIOD_S)
+    assert kept(found).sum() == N - 30 - 40 - 3
+    assert not found.set_back
+
+
+def test_a_clock_that_is_set_back_for_good_after_a_pause_is_no_island(clock):
+    given = clock.copy()
+    given[1500:] += 100.0
+    given[1540:] -= 30.0
+    found = screen_stamps(given, PERIOD_S)
+    assert kept(found).all()
+    assert [row for row, _ in found.set_back] == [1540]
+
+
 @pytest.mark.parametrize("given", [[], [1.0], [np.nan] * 30, [5.0] * 30])
 def test_next_to_nothing_is_no_trouble(given):
     assert kept(screen_stamps(np.array(given), PERIOD_S)).sum() <= 1

@@ -115,3 +115,16 @@ def test_a_wrong_catalogue_is_refused_in_one_sentence(tmp_path, text, words):
     with pytest.raises(FileError, match=words) as refusal:
         StarCatalogue.load(path)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("stars", "is_refused"), [(5000, False), (5001, True), (60_000, True)])
+def test_a_list_of_more_stars_than_can_be_looked_up_is_refused_at_once(tmp_path, stars, is_refused):
+    path = tmp_path / "ceiling.csv"
+    side = 300
+    lines = [f"{row},{0.04 * (row % side):.3f},{0.04 * (row // side):.3f}" for row in range(stars)]
+    path.write_text("id,x_m,y_m\n" + "\n".join(lines) + "\n")
+    if not is_refused:
+        assert len(StarCatalogue.load(path)) == stars
+        return
+    with pytest.raises(FileError, match=rf"ceiling\.csv: lists {stars} stars, expected 5000 at most"):
+        StarCatalogue.load(path)

@@ -256,6 +256,36 @@ def test_accelerometers_whose_zero_jumps_are_named_within_a_second(air):
         assert not any(each.id.startswith("valve") for _, findings in found for each in findings)
 
 
+@pytest.mark.parametrize("newtons", [1.2, 1.6, 3.0])
+@pytest.mark.parametrize("noise", ["DEFAULT", "DATASHEET"])
+def test_a_hand_that_pushes_steadily_is_no_shifted_sensor(air, noise, newtons):
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        force = newtons * np.cos(angle), newtons * np.sin(angle)
+        truth = air.Truth.drawn(rng, push=(FAULT_MS, FAULT_MS + 2500.0, *force))
+        chosen = air.commands(rng, 120, truth)
+        flown = air.fly(
+            air.make_detector(getattr(air, noise)),
+            rng,
+            truth,
+            chosen,
+            noise=getattr(air, noise),
+            period_ms=10,
+        )
+        assert {each.id for _, findings in flown for each in findings} == {"pushed"}
+
+
+@pytest.mark.parametrize("size_m_s2", [0.3, 2.0])
+def test_a_sensor_that_reads_what_no_hand_can_go_on_pushing_is_broken(air, size_m_s2):
+    rng = np.random.default_rng(1)
+    truth = air.Truth.drawn(rng, shift=(FAULT_MS, size_m_s2, 0.0))
+    found = list(air.fly(air.make_detector(), rng, truth, air.commands(rng, 120, truth), period_ms=10))
+    when = next(when for when, findings in found if any(each.id == "imu_shifted" for each in findings))
+    carried_s = np.sqrt(2.0 / size_m_s2)  # until a hand would have carried it a metre
+    assert max(0.8, carried_s) - 0.1 < when - FAULT_S < max(0.8, carried_s) + 0.2
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("noise", "period_ms"), [("DEFAULT", 4), ("DEFAULT", 10), ("DATASHEET", 10)])
 def test_healthy_mock_ups_with_all_that_is_not_known_of_them_are_not_accused(air, seed, noise, period_ms):
