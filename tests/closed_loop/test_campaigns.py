@@ -232,12 +232,12 @@ def test_a_campaign_is_not_continued_on_another_rig(file, tmp_path):
 
 def test_a_run_that_raises_is_a_row_and_not_the_end(file, tmp_path):
     path = tmp_path / "scenario.toml"
-    path.write_text(SCENARIO + '"vehicles.alpha.start.x_m" = { choice = [0.0, 9.0] }\n')
+    path.write_text(SCENARIO + '"vehicles.alpha.start.x_m" = { normal = [-0.9, 1.0] }\n')
     run_campaign(load(path), Plan(4, 2), tmp_path / "c", Means(1), lambda done, total: None, resume=False)
     text = (tmp_path / "c" / "runs.csv").read_text()
     assert text.count("\n") == 5
     assert ",error," in text
-    assert "vehicles.alpha.start: (9, " in text
+    assert "vehicles.alpha.start: (" in text
     assert ",passed," in text
 
 

@@ -83,7 +83,7 @@ def _check(rig: Rig) -> None:
         try:
             config = config_of(rig, name)
         except ValidationError as error:
-            raise ValueError(f"{key}.parameters.{_first(error)}") from error
+            raise ValueError(f"{key}.parameters{_first(error)}") from error
         for neighbour in row.neighbours(config):
             if neighbour == name or neighbour not in rig.vehicles:
                 others = ", ".join(other for other in rig.vehicles if other != name) or "none"
@@ -120,7 +120,9 @@ def _check_name(controller: str, key: str) -> None:
 
 def _first(error: ValidationError) -> str:
     first = error.errors()[0]
-    where = ".".join(map(str, first["loc"]))
+    where = "".join(f".{step}" for step in first["loc"])  # nowhere: the parameters as a whole
+    if not where:
+        return f": {message_of(first)}"
     if first["type"] == "extra_forbidden":
         return f"{where}: is no parameter of this controller (a typo?)"
     return f"{where}: {message_of(first)}, found {first['input']!r}"

@@ -205,19 +205,3 @@ def test_after_contact_it_stands_off():
 def test_a_corridor_that_makes_no_sense_is_refused(parameters, words):
     with pytest.raises(ValueError, match=words):
         make_controller("dock", {"target": "alpha", **parameters}, VEHICLE)
-
-
-def test_one_that_turns_keeps_its_place_and_gets_up_to_its_rate():
-    law = make_controller("turn", {"rate_deg_s": 3.0}, VEHICLE)
-    goal, heading_rad, rate_rad_s = Goal((0.1, 0.2), 0.0), 1.0, 0.0
-    for _ in range(300):
-        state = ControlState((0.1, 0.2), (0.0, 0.0), heading_rad, rate_rad_s)
-        wrench = law.update(state, goal, DT_S)
-        assert wrench.force_body_n == pytest.approx((0.0, 0.0), abs=1e-9)
-        turn = wrench.torque_nm / VEHICLE.inertia_kg_m2
-        heading_rad += rate_rad_s * DT_S + 0.5 * turn * DT_S**2
-        rate_rad_s += turn * DT_S
-    assert math.degrees(rate_rad_s) == pytest.approx(3.0, abs=0.05)
-    # 6 s of ramp cost half of their way
-    assert math.degrees(heading_rad - 1.0) == pytest.approx(3.0 * (30.0 - 3.0), abs=1.0)
-    assert law.setpoint(goal).position_table_m == (0.1, 0.2)

@@ -209,7 +209,7 @@ def test_what_is_no_rig_file_is_one_sentence(tmp_path, content, sentence):
         (
             "[vehicles.alpha]\n",
             '[vehicles.alpha]\ncontrol = { controller = "path", parameters = { waypoints_m = [] } }\n',
-            "vehicles.alpha.control.parameters.waypoints_m: expected at least 1 of them, found []",
+            "vehicles.alpha.control.parameters: waypoints_m: shape = 'waypoints' needs at least one",
         ),
     ],
 )
