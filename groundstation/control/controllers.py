@@ -24,6 +24,7 @@ from groundstation.control.path import PathConfig, PathFollowing
 from groundstation.control.state import Vector2
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.trajectory import Trajectory, TrajectoryConfig
+from groundstation.control.tumble import Tumble, TumbleConfig
 from groundstation.control.turn import Turn, TurnConfig
 from groundstation.control.vehicle import VehicleModel
 
@@ -108,10 +109,17 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             lambda config: tuple(config.neighbours),
         ),
         "path": ControllerRow(
-            "follow waypoints, once or round and round",
+            "follow waypoints, the perimeter or a figure eight",
             PathConfig,
             PathFollowing,
             {"waypoints_m": ((0.3, 0.0), (0.3, 0.3))},
+            has_program=True,
+        ),
+        "tumble": ControllerRow(
+            "play a target that nobody controls: it turns and drifts",
+            TumbleConfig,
+            Tumble,
+            {"mode": "free", "span_s": 20.0},
             has_program=True,
         ),
         "follow": ControllerRow(

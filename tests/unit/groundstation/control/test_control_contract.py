@@ -91,6 +91,6 @@ def test_a_misspelt_setting_is_named(name):
 def test_an_unknown_controller_is_answered_with_the_known_ones():
     with pytest.raises(
         ValueError,
-        match=r"'hover'; there are dock, follow, formation, go_to, path, station, trajectory, turn",
+        match=r"'hover'; there are dock, follow, formation, go_to, path, station, trajectory, tumble, turn",
     ):
         make_controller("hover", {}, VEHICLE)
