@@ -25,10 +25,14 @@ class AtSetpoint(ABC):
         config: How to get there.
         vehicle: The mock-up.
         keep_in: Part of the table that it keeps to.
+
+    Attributes:
+        span_s: Since the update before.
     """
 
     def __init__(self, config: GoToConfig, vehicle: VehicleModel, keep_in: KeepIn | None) -> None:
         self._go_to = GoTo(config, vehicle, keep_in)
+        self.span_s = 0.0
         self.reset()
 
     @abstractmethod
@@ -62,7 +66,8 @@ class AtSetpoint(ABC):
         """See `Controller.update`."""
         if not (math.isfinite(dt_s) and dt_s > 0.0):
             raise ValueError(f"dt_s must be above 0, found {dt_s}")
-        self._watch(neighbours, min(dt_s, LONGEST_SPAN_S))
+        self.span_s = min(dt_s, LONGEST_SPAN_S)
+        self._watch(neighbours, self.span_s)
         state = state.bounded()
         setpoint = self.wanted(state, goal.bounded(), neighbours)
         if setpoint is None:

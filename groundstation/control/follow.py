@@ -18,6 +18,9 @@ from groundstation.control.motion_watch import Acceleration
 from groundstation.control.state import ControlState, Goal, Vector2
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
 
+WIDER_M, WIDENING_S = 0.15, 3.0
+"""A silent leader is given so much more room, over so long; then the place is held."""
+
 
 class FollowConfig(BaseModel):
     """Whom to follow, and how.
@@ -56,10 +59,33 @@ class Follow(AtSetpoint):
         super().__init__(config.go_to, vehicle, keep_in)
         self._config = config
 
+    def reset(self) -> None:
+        """See `AtSetpoint.reset`."""
+        super().reset()
+        self._last_m: Vector2 | None = None
+        self._silent_s = 0.0
+
     def wanted(self, state: ControlState, goal: Goal, neighbours: Mapping[str, ControlState]) -> Goal | None:
         """The place beside the leader; None while the leader is silent."""
         leader = neighbours.get(self._config.leader)
-        return None if leader is None else self._beside(leader.bounded(), state, goal)
+        if leader is None:
+            return self._away_from_where_it_was(goal)
+        self._last_m, self._silent_s = leader.bounded().position_table_m, 0.0
+        return self._beside(leader.bounded(), state, goal)
+
+    def _away_from_where_it_was(self, goal: Goal) -> Goal | None:
+        """A leader that is silent may be anywhere near: the distance widens for a while, then it is held."""
+        held = self.setpoint(goal)
+        self._silent_s += self.span_s
+        if self._last_m is None or self._silent_s > WIDENING_S:
+            return None
+        x, y = self._last_m
+        away = (held.position_table_m[0] - x, held.position_table_m[1] - y)
+        length_m = max(math.hypot(*away), NEAREST_M)
+        wide_m = self._config.distance_m + WIDER_M * self._silent_s / WIDENING_S
+        place = (x + away[0] * wide_m / length_m, y + away[1] * wide_m / length_m)
+        speed = _scaled(away, WIDER_M / WIDENING_S / length_m)
+        return Goal(place, held.heading_rad, speed)
 
     def _beside(self, leader: ControlState, state: ControlState, goal: Goal) -> Goal:
         """Pose, velocity and acceleration of the place that is to be kept."""

@@ -117,9 +117,10 @@ def test_a_leader_that_falls_silent_makes_its_follower_hold(fly):
             'parameters = { leader = "alpha", distance_m = 1.0 } }',
         )
     ]
-    flight = fly(failure("silent_imu", 6.0), rig=TWO, changes=follows).run(START_S + 5.0)
+    flight = fly(failure("silent_imu", 10.0), rig=TWO, changes=follows).run(START_S + 4.0)
     assert first_s(flight, "leader_old", "beta") < 1.5
-    assert flight.modes("beta")[-1] == "holding"
+    assert flight.modes("beta")[-1] == "flying"  # it widens the distance, then holds its place
+    assert flight.run(5.0).modes("beta")[-1] == "holding"
     assert flight.run(12.0).modes("beta")[-1] == "flying"
 
 

@@ -102,15 +102,6 @@ def test_who_does_not_face_keeps_the_heading_of_its_goal():
     assert wanted(follow(face=False), state, leader).heading_rad == 0.0
 
 
-def test_a_silent_leader_leaves_the_follower_at_rest_at_its_last_place():
-    law = follow()
-    state = ControlState((-0.8, 0.0), (0.0, 0.0), 0.0, 0.0)
-    before = wanted(law, state, ControlState((0.0, 0.0), (0.05, 0.0), 0.0, 0.0))
-    law.update(state, HERE, 0.1)
-    assert law.setpoint(HERE).position_table_m == before.position_table_m
-    assert law.setpoint(HERE).velocity_table_m_s == (0.0, 0.0)
-
-
 @pytest.mark.parametrize(
     ("parameters", "word"),
     [
@@ -182,3 +173,26 @@ def test_who_falls_far_behind_starts_from_where_it_is():
 def test_ways_that_lead_nowhere_are_refused(waypoints_m, word):
     with pytest.raises(ValueError, match=word):
         path(waypoints_m=waypoints_m)
+
+
+def test_a_leader_that_falls_silent_gets_more_room_and_then_the_place_is_held():
+    law = make_controller("follow", {"leader": "leader", "distance_m": 0.8}, VEHICLE)
+    leader = ControlState((0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
+    own, goal = ControlState((0.8, 0.0), (0.0, 0.0), math.pi, 0.0), Goal((0.8, 0.0), math.pi)
+    law.update(own, goal, 0.1, neighbours={"leader": leader})
+    assert law.setpoint(goal).position_table_m == pytest.approx((0.8, 0.0))
+    places = []
+    for _ in range(50):
+        law.update(own, goal, 0.1)
+        places.append(law.setpoint(goal))
+    assert places[9].position_table_m == pytest.approx((0.85, 0.0))
+    assert places[9].velocity_table_m_s == pytest.approx((0.05, 0.0))
+    assert places[29].position_table_m == pytest.approx((0.95, 0.0), abs=0.006)
+    assert places[-1].position_table_m == places[31].position_table_m
+    assert places[-1].velocity_table_m_s == (0.0, 0.0)
+    assert abs(places[-1].heading_rad) == pytest.approx(math.pi)
+    law.update(own, goal, 0.1, neighbours={"leader": leader})
+    assert law.setpoint(goal).position_table_m == pytest.approx((0.8, 0.0))
+    law.reset()
+    law.update(own, goal, 0.1)
+    assert law.setpoint(goal).position_table_m == pytest.approx((0.8, 0.0))  # it knows of no leader
