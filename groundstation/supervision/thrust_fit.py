@@ -156,6 +156,10 @@ class ThrustFit:
         for valve in self.weak:
             self.take_healthy(valve)
 
+    def doubt_zero(self) -> None:
+        """Take it that the zero, as learned so far, may be wrong: it is learned anew from here."""
+        self._zero_variance = self._config.zero_sigma_m_s2**2
+
     @property
     def knows_zero(self) -> bool:
         """Whether a small force that lasts is no longer the accelerometers' unknown zero."""

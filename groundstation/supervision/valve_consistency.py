@@ -211,11 +211,15 @@ class ValveConsistency:
     def _name(self, stamp_ns: int, verdict: Verdict) -> None:
         """Believe it. What a weak or closed valve gives is taken for known, and the watch goes on."""
         best = verdict.best
-        if verdict.is_hand:
-            change_m_s = best.size * self._fit.sizes[best.valve] * self._config.block_s
-            self._push(stamp_ns, change_m_s, "a force that is no valve's")
+        force_m_s2 = best.size * self._fit.sizes[best.valve] if best.valve >= 0 else 0.0
+        may_be_zero = verdict.is_hand and force_m_s2 < self._config.fit.zero_bound_m_s2
+        if verdict.is_hand and not may_be_zero:
+            self._push(stamp_ns, force_m_s2 * self._config.block_s, "a force that is no valve's")
             return
         self._suspicions.drop()
+        if best.kind is Kind.ZERO or may_be_zero:
+            self._fit.doubt_zero()
+            return
         if best.kind is Kind.WORKS:
             whose = verdict.whose
             self._fit.take_healthy(best.valve)

@@ -161,6 +161,9 @@ class ValveInquiry:
         self.forget()
         if best.kind is Kind.TIMING:
             return None
+        zero = next((each for each in rivals if each.kind is Kind.ZERO), None)
+        if zero is not None and best.kind is Kind.OPEN:
+            best, rivals = zero, ()  # a valve that gives a little turns, too: that it did not show
         turns_otherwise = best.turning >= _TURN_KNOWN and best.by_rate < -0.5 * best.turning
         is_across = best.across > _ACROSS + 3.0 * best.across_sigma
         others = tuple(each for each in rivals if each.valve >= 0)

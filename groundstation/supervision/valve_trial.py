@@ -23,6 +23,7 @@ OPENS_CHANCE, STAYS_CHANCE = 0.02, 0.95
 CLOSED_SHARE = 0.75
 """Missing so much of its thrust, a valve is closed; else it is weak."""
 _MISSING, _ADDED, _AGAIN = (0.4, 1.0), (0.1, 1.2), (0.3, 1.2)
+_ZERO_M_S2 = (-0.010, 0.010)
 _SUPPLY, _LATE_S = (0.4, 1.0), (-0.008, 0.008)
 
 
@@ -34,6 +35,7 @@ class Kind(Enum):
     OPEN = "valve_stuck_open"
     WORKS = "works again"
     SUPPLY = "supply pressure"
+    ZERO = "another zero of the accelerometers"
     TIMING = "delays other than the rig's"
 
 
@@ -105,10 +107,13 @@ class ValveTrial:
         self._onsets = sorted(set(onsets))
         self._marks = frozenset(marks)
         # columns: of each valve thrust that is missing, not commanded, more than is known of it; then of all
-        # valves missing thrust, late opening, late closing
+        # valves missing thrust, late opening, late closing; of the accelerometers another zero in x, in y
         again = [_AGAIN if valve in fit.weak else (0.0, 0.0) for valve in range(count)]
         self._low, self._high = np.array(
-            [_MISSING] * count + [_ADDED] * count + again + [_SUPPLY, _LATE_S, _LATE_S]
+            [_MISSING] * count
+            + [_ADDED] * count
+            + again
+            + [_SUPPLY, _LATE_S, _LATE_S, _ZERO_M_S2, _ZERO_M_S2]
         ).T
         shape = (len(self._onsets), len(self._low))
         self._force, self._squared, self._cross = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -158,13 +163,14 @@ class ValveTrial:
             felt[row, :count] = -given * by_valve
             felt[row, count : 2 * count] = (1.0 - shares) * by_valve
             felt[row, 2 * count : 3 * count] = shares * by_valve
-            felt[row, 3 * count :] = -given @ by_valve, -late @ by_valve, long @ by_valve
+            felt[row, 3 * count :] = -given @ by_valve, -late @ by_valve, long @ by_valve, 0.0, 0.0
         felt[2] = abs(felt[2])
+        felt[0, -2] = felt[1, -1] = 1.0
         turned = np.empty(len(self._low))
         turned[:count] = -turning * st
         turned[count : 2 * count] = (1.0 - turns) * st
         turned[2 * count : 3 * count] = turns * st
-        turned[3 * count :] = -turning @ st, -late @ st, long @ st
+        turned[3 * count :] = -turning @ st, -late @ st, long @ st, 0.0, 0.0
         return felt, turned
 
     def _open(self, block: Block, misfit: Misfit) -> None:
@@ -222,6 +228,9 @@ class ValveTrial:
                     1.0 / math.sqrt(squared) / abs(size or 1.0),
                 )
             )
+        y, x = found.pop(), found.pop()  # of a force that stays both components count
+        both, twice = x.likelihood + y.likelihood, x.is_twice or y.is_twice
+        found.append(x._replace(likelihood=both, is_twice=twice, size=math.hypot(x.size, y.size)))
         for valve, opening in enumerate(self._openings):
             so_far = [then[valve] for then in self._openings_at_marks]
             twice = any(
@@ -246,7 +255,7 @@ class ValveTrial:
             return Kind.OPEN
         if column < 3 * self._count:
             return Kind.WORKS
-        return Kind.SUPPLY if column == 3 * self._count else Kind.TIMING
+        return (Kind.SUPPLY, Kind.TIMING, Kind.TIMING, Kind.ZERO, Kind.ZERO)[column - 3 * self._count]
 
 
 def mixed(off: float, on: float, chance: float) -> tuple[float, float]:

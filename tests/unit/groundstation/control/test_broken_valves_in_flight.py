@@ -59,7 +59,8 @@ def test_it_holds_station_as_well_as_before(fly, vehicle, world, state, knock_m)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("state", [STUCK_CLOSED, stuck_open()])
-def test_without_being_told_it_does_not(fly, vehicle, world, state):
-    """So that the one above is worth something."""
-    never = flights(fly, vehicle, world, state, range(4), found_after_s=1000.0)
-    assert min(worst_m for _, _, worst_m, _ in never) > 0.02
+def test_without_being_told_it_is_worse(fly, vehicle, world, state):
+    """So that the one above is worth something: the law makes up for much, but not for all."""
+    never = np.array(list(flights(fly, vehicle, world, state, range(4), found_after_s=1000.0)))
+    told = np.array(list(flights(fly, vehicle, world, state, range(4))))
+    assert np.mean(never[:, 2]) > 1.5 * np.mean(told[:, 2])
