@@ -77,7 +77,7 @@ def test_a_scenario_that_holds_ends_with_0_by_itself_and_replays(launch, scenari
 
 
 def test_a_limit_that_breaks_ends_with_1_and_is_named(launch, scenario):
-    run = launch(scenario("below = 0.0"))
+    run = launch(scenario("below = 0.001"))
     code, said = run.ends_by_itself()
     assert code == 1, said
     assert "FAILED gas_ns of alpha is " in said
