@@ -230,7 +230,7 @@ class ValveConsistency:
         self.health = {**self.health, **verdict.health()}
         if best.kind in (Kind.WEAK, Kind.CLOSED):
             self._fit.take_weak(best.valve, best.size)
-        else:
+        elif best.kind is Kind.OPEN:
             self._is_settled = True
 
     def _push(self, stamp_ns: int, change_m_s: float, what: str) -> None:

@@ -29,6 +29,7 @@ _WHOLE = 1.5
 _TURN_KNOWN = 8.0
 """The gyro has a say about thrust not commanded when it would have given this much."""
 _ACROSS = 0.35
+_MANY = 3
 
 
 class Verdict(NamedTuple):
@@ -140,11 +141,21 @@ class ValveInquiry:
             self._fit, self._blocks, self._onsets, self._marks, _WITNESS * self._threshold
         )
 
+    def _without_supply(self, explanations: list[Explanation]) -> list[Explanation]:
+        """A supply that fails shows in valves one by one: of fewer than three it is not believed."""
+        least = _WHOLE * self._threshold
+        ill = {
+            each.valve
+            for each in explanations
+            if each.kind in (Kind.WEAK, Kind.CLOSED) and each.likelihood >= least
+        }
+        return [each for each in explanations if each.kind is not Kind.SUPPLY or len(ill) >= _MANY]
+
     def verdict(self) -> Verdict | None:
         """What it was, once that is clear or the wait for clearness is over."""
         if self._trial is None:
             return None
-        explanations = self._trial.explanations()
+        explanations = self._without_supply(self._trial.explanations())
         best = explanations[0]
         if best.likelihood < _WHOLE * self._threshold or not best.is_twice:
             self._waited = 0
