@@ -137,7 +137,7 @@ def fly(vehicle: Vehicle, given: argparse.Namespace) -> None:
     while due_s < begin_s + given.duration:
         vehicle.push(*wrench(vehicle.state(), begin, given, due_s - begin_s))
         due_s += PERIOD_S
-        time.sleep(max(due_s - time.monotonic(), 0.0))
+        time.sleep(max(due_s - time.monotonic(), 0.0))  # one wrench a period, whatever the last one took
         refusal = vehicle.refusal()
         if due_s >= renew_s and not refusal:
             renew_s += RENEWED_S

@@ -4,17 +4,15 @@ While nobody says where that is, the last place is held at rest; before anybody 
 mock-up is.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.motion_watch import AT_REST, Acceleration, MotionWatch
 from groundstation.control.state import BodyWrench, ControlState, Goal
-from groundstation.control.station import LONGEST_SPAN_S
 from groundstation.control.vehicle import VehicleModel
 
 
@@ -64,9 +62,7 @@ class AtSetpoint(ABC):
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
-        self.span_s = min(dt_s, LONGEST_SPAN_S)
+        self.span_s = span_of(dt_s)
         self._watch(neighbours, self.span_s)
         state = state.bounded()
         setpoint = self.wanted(state, goal.bounded(), neighbours)

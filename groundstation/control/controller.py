@@ -1,5 +1,6 @@
 """What every controller is: the one interface that nodes and contract tests know."""
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Protocol
@@ -7,6 +8,19 @@ from typing import Protocol
 from groundstation.control.state import BodyWrench, ControlState, Goal
 
 NO_NEIGHBOURS: Mapping[str, ControlState] = MappingProxyType({})
+LONGEST_SPAN_S = 1.0
+"""After a longer gap an observer takes the measurement as it is, and a reference goes on from there."""
+
+
+def span_of(dt_s: float) -> float:
+    """The span of an update, as long as it is believed.
+
+    Raises:
+        ValueError: It is not positive and finite.
+    """
+    if not (math.isfinite(dt_s) and dt_s > 0.0):
+        raise ValueError(f"dt_s must be above 0, found {dt_s}")
+    return min(dt_s, LONGEST_SPAN_S)
 
 
 class Controller(Protocol):

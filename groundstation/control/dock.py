@@ -13,12 +13,11 @@ from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.corridor import Corridor
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, rotate
-from groundstation.control.station import LONGEST_SPAN_S
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -141,9 +140,7 @@ class Dock:
     ) -> BodyWrench:
         """See `Controller.update`; the goal is not looked at."""
         del goal
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
-        state, span_s = state.bounded(), min(dt_s, LONGEST_SPAN_S)
+        state, span_s = state.bounded(), span_of(dt_s)
         seen = neighbours.get(self._config.target)
         if seen is None:
             self._held = self._unseen(state)

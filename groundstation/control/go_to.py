@@ -19,11 +19,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from groundstation.control.authority import Authority, authority_along
 from groundstation.control.coasting import CoastingWay, least_gas
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.reference import MotionLimits, PointReference
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
-from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
+from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
@@ -120,9 +120,7 @@ class GoTo:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`; neighbours are not looked at."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
-        reference = self._reference(state.bounded(), goal.bounded(), min(dt_s, LONGEST_SPAN_S))
+        reference = self._reference(state.bounded(), goal.bounded(), span_of(dt_s))
         return self._station.update(state, reference, dt_s, applied=applied)
 
     def _reference(self, state: ControlState, goal: Goal, dt_s: float) -> Goal:

@@ -13,13 +13,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.curves import Curve, FigureEight, Perimeter, sampled, tightest_per_m
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.laps import Laps
 from groundstation.control.reference import MotionLimits, PointReference
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
-from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
+from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -142,10 +142,8 @@ class PathFollowing:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`; goal and neighbours are not looked at."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
         step = self._advanced if self._curve is None else self._round
-        reference = step(state.bounded(), min(dt_s, LONGEST_SPAN_S))
+        reference = step(state.bounded(), span_of(dt_s))
         self._reference = reference
         return self._station.update(state, reference, dt_s, applied=applied)
 

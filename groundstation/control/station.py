@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.gains import lqr_gains
 from groundstation.control.observer import DisturbanceObserver
 from groundstation.control.state import (
@@ -30,7 +30,6 @@ from groundstation.frames import wrap_angle
 LEARNING_SHARE = 0.5
 """Of the force in every direction: who pushes harder learns nothing of the table, for a twentieth of that
 push, by which valves differ, would pass for a slope."""
-LONGEST_SPAN_S = 1.0  # after a longer gap the observer takes the measurement as it is
 
 
 class StationConfig(BaseModel):
@@ -106,10 +105,8 @@ class StationKeeping:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`; neighbours are not looked at."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
         state, goal = state.bounded(), goal.bounded()
-        self._observe(state, self._last if applied is None else applied, min(dt_s, LONGEST_SPAN_S))
+        self._observe(state, self._last if applied is None else applied, span_of(dt_s))
         force = rotate(self._force_table_n(state, goal), -state.heading_rad)
         self._last = self._envelope.saturate(BodyWrench(force, self._torque_nm(state, goal)))
         return self._last

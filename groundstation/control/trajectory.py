@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.edge import braking_to_count_on
 from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.safety_filter import SafetyFilterConfig
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, clamp
-from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
+from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 
@@ -180,9 +180,7 @@ class Trajectory:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`; of the goal, the heading is kept."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
-        state, goal, span_s = state.bounded(), goal.bounded(), min(dt_s, LONGEST_SPAN_S)
+        state, goal, span_s = state.bounded(), goal.bounded(), span_of(dt_s)
         at_m = {name: neighbours[name].bounded() for name in self._numbers if name in neighbours}
         at_m[self._own] = state
         if self._phase_s is None:

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from groundstation.control.controller import NO_NEIGHBOURS
+from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
-from groundstation.control.station import LONGEST_SPAN_S, StationConfig, StationKeeping
+from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.frames import wrap_angle
 
@@ -96,10 +96,8 @@ class Tumble:
         neighbours: Mapping[str, ControlState] = NO_NEIGHBOURS,
     ) -> BodyWrench:
         """See `Controller.update`; goal and neighbours are not looked at."""
-        if not (math.isfinite(dt_s) and dt_s > 0.0):
-            raise ValueError(f"dt_s must be above 0, found {dt_s}")
         state = state.bounded()
-        self._reference = self._moved(state, min(dt_s, LONGEST_SPAN_S))
+        self._reference = self._moved(state, span_of(dt_s))
         return self._station.update(state, self._reference, dt_s, applied=applied)
 
     def _moved(self, state: ControlState, dt_s: float) -> Goal:
