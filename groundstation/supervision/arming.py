@@ -56,6 +56,7 @@ def _heartbeats(question: Question) -> str:
         for name, is_missing in (
             ("valve node", sightings.node is None or sightings.is_node_silent(now_ns)),
             ("fault detector", sightings.findings_ns is None),
+            ("controller", sightings.placed_ns is not None and sightings.demand_ns is None),
             (no_state, _has_no_state(question) or (sightings.own and sightings.is_state_silent(now_ns))),
         )
         if is_missing
@@ -121,7 +122,7 @@ def _names(rows: Iterable[Standing]) -> str:
 
 
 CHECKS: tuple[Check, ...] = (
-    Check("heartbeats", "fusion, fault detector and valve node publish", _heartbeats),
+    Check("heartbeats", "fusion, fault detector, controller and valve node publish", _heartbeats),
     Check("faults", "no fault stands that keeps it on the ground, or would land it", _faults),
     Check("lesser faults", "nor one that a person may override", _lesser_faults, may_be_overridden=True),
     Check("rest", "unbroken rest with good IMU data, as long as the rig asks for", _rest,

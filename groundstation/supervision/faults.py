@@ -198,8 +198,8 @@ FAULTS: Mapping[str, Fault] = {
               ((0.0, _CUT),), _PERSON, False, False, "Put them apart."),
         # -- who looks after it ---------------------------------------------------------------------
         Fault("controller_silent", "No demand comes from the controller.",
-              "no demand for 0.5 s", 1.0,
-              ((0.0, _HOLD), (5.0, _LAND)), _ITSELF, False, False,
+              "no demand for 0.5 s while there is a state", 1.0,
+              ((0.0, _HOLD), (5.0, _LAND)), _ITSELF, True, False,
               "See whether the controller's process is started again."),
         Fault("outside_silent", "The program that flies it from outside is silent.",
               "no wrench of its that counts for 0.24 s", 0.5,

@@ -93,6 +93,7 @@ class Sightings:
         began_ns: When the supervisor began: nothing is silent before its time.
         most_frames_hz: Frames a second of which the bus is flooded.
         own: The newest estimate; None before the first.
+        placed_ns: Since when the estimator places it without a break; None while it does not.
         others: Those of the other vehicles.
         leaders: Names of vehicles whose states its controller wants.
         name: Of this vehicle.
@@ -120,6 +121,7 @@ class Sightings:
     began_ns: int
     most_frames_hz: float = math.inf
     own: Seen | None = None
+    placed_ns: int | None = None
     others: dict[str, Seen] = field(default_factory=dict)
     leaders: tuple[str, ...] = ()
     name: str = ""
@@ -146,6 +148,14 @@ class Sightings:
             self.late_s = (now_ns - self.tick_ns - period_ns) / NS_PER_S
         self.tick_ns = now_ns
 
+    def see_own(self, seen: Seen) -> None:
+        """Take the newest estimate of the vehicle itself."""
+        self.own = seen
+        if seen.status != "flying":
+            self.placed_ns = None
+        elif self.placed_ns is None:
+            self.placed_ns = seen.arrival_ns
+
     @property
     def is_at_rest(self) -> bool:
         """Whether the newest estimate shows neither speed nor turn."""
@@ -163,6 +173,13 @@ class Sightings:
     def is_state_silent(self, now_ns: int) -> bool:
         """Whether the newest estimate is too old to fly by."""
         return self.is_silent(None if self.own is None else self.own.arrival_ns, STATE_S, now_ns)
+
+    def is_controller_silent(self, now_ns: int, limit_s: float = CONTROLLER_S) -> bool:
+        """Whether the controller demands nothing although there is a state to control."""
+        if self.placed_ns is None or self.is_state_silent(now_ns):
+            return False
+        last_ns = self.placed_ns if self.demand_ns is None else max(self.demand_ns, self.placed_ns)
+        return self.is_silent(last_ns, limit_s, now_ns)
 
     def is_node_silent(self, now_ns: int) -> bool:
         """Whether the valve node is silent."""
@@ -189,6 +206,8 @@ class Sightings:
             found.update(self._silences(now_ns, is_grounded=is_grounded))
         found.update(self._station(now_ns))
         found.update(self._supplies())
+        if self.is_controller_silent(now_ns):
+            found["controller_silent"] = _age("demand", self.demand_ns, now_ns)
         if is_aloft:
             found.update(self._thrust())
             found.update(self._motion(now_ns))
@@ -289,12 +308,6 @@ class Sightings:
                 yield "node_disobeys", "it reports that it is disarmed"
             elif node.dead_man:
                 yield "node_disobeys", "its dead man has closed the valves"
-        if (
-            may_open
-            and not self.is_state_silent(now_ns)  # without a state no controller works
-            and self.is_silent(self.demand_ns, CONTROLLER_S, now_ns)
-        ):
-            yield "controller_silent", _age("demand", self.demand_ns, now_ns)
         if may_open and self.outside_trouble:
             yield "outside_silent", self.outside_trouble
 

@@ -115,7 +115,7 @@ class SupervisorNode(Node):
                 if message.vehicle != self.vehicle:
                     sightings.others[message.vehicle] = seen
                 else:
-                    sightings.own = seen
+                    sightings.see_own(seen)
             case FusionStatus():
                 sightings.rest_s, sightings.fix_age_s = message.rest_s, message.fix_age_s
                 self._count_fixes(message)

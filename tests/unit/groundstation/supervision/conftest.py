@@ -256,7 +256,7 @@ class Vehicle:
         if self.air_obeys:
             self.floating = ruling.is_air_on
         if "state" not in self.silent:
-            seen_now.own = seen(now_ns, self.position, self.velocity, 0.0, self.status, self.sigma)
+            seen_now.see_own(seen(now_ns, self.position, self.velocity, 0.0, self.status, self.sigma))
         if "node" not in self.silent:
             seen_now.node = node(now_ns, armed=ruling.may_open, floating=self.floating)
         if "detector" not in self.silent:

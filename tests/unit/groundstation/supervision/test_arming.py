@@ -59,6 +59,14 @@ def test_each_heartbeat_is_asked_for(known, silent, name):
     assert f"heartbeats: nothing comes from {name}" in against(known, override="test")
 
 
+def test_a_controller_that_has_a_state_must_have_demanded_something(known, seen):
+    known.demand_ns = None
+    known.see_own(seen(NOW_NS))
+    assert against(known) == ("heartbeats: nothing comes from controller",)
+    known.demand_ns = NOW_NS
+    assert against(known) == ()
+
+
 @pytest.mark.parametrize(("age_ms", "is_old"), [(300, False), (301, True)])
 def test_a_state_must_be_fresh(known, seen, age_ms, is_old):
     known.own = seen(NOW_NS - age_ms * 1_000_000)

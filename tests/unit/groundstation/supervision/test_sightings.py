@@ -17,7 +17,7 @@ def known(sightings, seen, node):
     """Everything is well at 20 s: all that publishes has published just now."""
     now_ns = 20 * S
     known = sightings(findings_ns=now_ns, demand_ns=now_ns, rest_s=8.0, fix_age_s=0.3)
-    known.own = seen(now_ns)
+    known.see_own(seen(now_ns))
     known.node = node(now_ns, armed=True, floating=True)
     return known
 
@@ -44,7 +44,7 @@ class TestSilence:
     def test_each_source_has_its_limit(self, known, seen, node, fault, limit_ms, detail):
         def at(now_ns):
             for name, kept in (
-                ("state_silent", lambda: setattr(known, "own", seen(now_ns))),
+                ("state_silent", lambda: known.see_own(seen(now_ns))),
                 ("can_silent", lambda: setattr(known, "node", node(now_ns, armed=True, floating=True))),
                 ("detector_silent", lambda: setattr(known, "findings_ns", now_ns)),
                 ("controller_silent", lambda: setattr(known, "demand_ns", now_ns)),
@@ -77,10 +77,23 @@ class TestSilence:
         known.own = None
         assert "controller_silent" not in found(known, 21 * S)
 
-    def test_a_controller_that_never_demanded_anything_is_missed_where_valves_may_open(self, known):
-        known.demand_ns = None
-        assert found(known) == {"controller_silent": "no demand was ever received"}
-        assert found(known, may_open=False) == {}
+    @pytest.mark.parametrize("is_grounded", [True, False])
+    def test_a_controller_that_never_demanded_anything_is_missed_once_there_is_a_state(
+        self, known, is_grounded
+    ):
+        known.demand_ns, known.placed_ns = None, 20 * S - 500 * MS
+        assert found(known, is_grounded=is_grounded) == {}
+        known.placed_ns -= 1
+        assert found(known, is_grounded=is_grounded) == {"controller_silent": "no demand was ever received"}
+
+    def test_a_controller_waits_for_the_first_placed_state_without_a_break(self, known, seen):
+        known.demand_ns = 18 * S
+        known.placed_ns = 18 * S
+        assert "controller_silent" in found(known)
+        known.see_own(seen(20 * S, status="resting"))
+        assert found(known) == {}
+        known.see_own(seen(20 * S))
+        assert found(known) == {}
 
     def test_a_program_outside_is_missed_where_valves_may_open(self, known):
         known.outside_trouble = "anna: no wrench for 250 ms"

@@ -171,8 +171,11 @@ class TestFaults:
         flying.silent.add("demand")
         assert flying.run(5.0)[-1] == "holding"
         modes = flying.run(4.0)
-        assert modes[:4] == ["holding", "landing", "resting", "armed"]
-        assert modes.count("armed") == 1, "it does not arm and land in turns while the fault stands"
+        assert modes == ["holding", "landing", "resting"]
+        assert flying.run(60.0) == ["resting"], "it does not take off and land in turns"
+        assert any("controller" in reason for reason in flying.ruling.waits_for)
+        flying.silent.clear()
+        assert flying.run(2.5) == ["resting", "armed", "flying"]
 
     def test_what_a_person_brakes_is_not_let_go_by_a_fault_that_ends(self, flying):
         flying.ask(Event.BRAKE)
@@ -288,14 +291,12 @@ class TestFaults:
         landed.run(0.04)
         assert landed.faults == ["position_uncertain"]
 
-    def test_a_controller_is_missed_only_where_valves_may_open(self, landed):
+    def test_a_dead_controller_is_missed_before_anybody_takes_off(self, landed):
         landed.silent.add("demand")
         landed.ask(Event.FLOAT_ON)
         landed.run(2.0)
-        assert landed.faults == []
-        landed.ask(Event.ARM)
-        landed.run(0.1)
         assert landed.faults == ["controller_silent"]
+        assert "controller_silent" in landed.ask(Event.ARM)
 
     def test_processes_that_start_slowly_are_no_fault_on_the_ground(self, landed):
         landed.silent.add("detector")
