@@ -269,8 +269,8 @@ class TickClock:
         while reads and reads[0][0] <= end:
             last_byte, arrival_ns, read_bytes = reads.popleft()
             sent = last_byte - (end - size)
-            if sent <= 0:  # it ended in rubbish or in a reply
-                self._next_departure_ns = None
+            if sent <= 0:  # it ended in rubbish or in a reply; the next byte may be this frame's first
+                self._next_departure_ns = departure_ns if sent == 0 else None
                 continue
             left_ns = departure_ns + sent * self._byte_ns
             to_next_ns = self._byte_ns
@@ -288,6 +288,9 @@ class TickClock:
         if is_last and end < self._bytes_read - 1:
             own_ns = latest_end_ns - self._origin_ns - departure_ns - size * self._byte_ns
             span_ns = self._least_span_ns(self._reads[-1][2])
+            left_ns, first_ns = departure_ns + size * self._byte_ns, self._next_departure_ns
+            if first_ns is not None and first_ns <= left_ns and len(reads) == 1:
+                span_ns = max(span_ns, left_ns - first_ns)
             self._add(Point(device_ns, own_ns, span_ns), is_backlog=True)
 
     def _least_span_ns(self, read_bytes: int) -> float:

@@ -45,8 +45,10 @@ class LinkWait:
     def wait(self, span_ns: float | None, pause_ns: float | None) -> tuple[float, float]:
         """Return the likely wait of the last byte of the packets that waited least, and its sigma, ns.
 
-        The likely wait is that of a timer which starts with a packet's first byte. What somebody says of a
-        timer that was not measured is likely, but no limit.
+        The likely wait is that of a timer which starts with a packet's first byte. Where such a timer would
+        have waited for the next byte, too, it is shorter than somebody says, or runs from the packet before:
+        packets that waited least have hardly waited then. What somebody says of a timer that was not measured
+        is likely, but no limit.
 
         Args:
             span_ns: from the departure of their first byte to that of their last; None if unknown.
@@ -69,6 +71,8 @@ class LinkWait:
             longest_ns = min(longest_ns, likely_ns)
         elif longest_ns == math.inf:
             longest_ns = likely_ns
+        if likely_ns > longest_ns + _TOLERANCE_NS:
+            likely_ns = 0.0
         likely_ns = min(likely_ns, longest_ns) if is_possible else longest_ns / 2
         if not longest_ns:
             return 0.0, 0.0

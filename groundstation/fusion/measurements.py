@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 
 REST_VELOCITY_M_S = 1e-6
 """Sigma of a landed vehicle's velocity: none, but not singular."""
-MIN_REST_PACKETS = 4
 MAX_REST_SPREAD = 2.5
 """A rest whose readings spread wider than this many sigmas of the white noise was not one."""
 
@@ -119,14 +118,14 @@ def learn_rest(
     At rest the accelerometers read bias - R(heading)^T slope, the gyro its bias.
 
     Returns:
-        The correction, or None if there were too few packets to judge.
+        The correction, or None if there is no packet.
 
     Raises:
         RestDisturbed: the readings spread too wide for a rest; nothing was changed.
     """
     good = segment.is_hole == 0.0
     n = int(good.sum())
-    if n < MIN_REST_PACKETS:
+    if n == 0:  # between fast fixes lie one or two packets: together they are the rest
         return None
     readings = np.array([segment.rate_rad_s[good], segment.ax_m_s2[good], segment.ay_m_s2[good]])
     density = np.array(

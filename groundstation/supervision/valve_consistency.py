@@ -174,7 +174,8 @@ class ValveConsistency:
         odd = (
             size > 4.0 * sigma + _OF_COMMANDED * misfit.commanded_m_s2 and size > _OF_LARGEST * self._largest
         )
-        self._watch_odd(block, misfit, is_odd=odd)
+        if self._watch_odd(block, misfit, is_odd=odd):
+            return  # what was compared with the zero of before teaches nothing
         broken = self._largest if self._valve_findings else 0.0  # what a valve that fails gives besides
         if size > _HARD_PUSH * self._largest + broken + misfit.commanded_m_s2 + 6.0 * sigma:
             self._push(stamp_ns, size * block.span_s, "a shock that no valve can give")
@@ -243,22 +244,22 @@ class ValveConsistency:
         self._calm_after, self._pushed_blocks = _CALM_BLOCKS, 0
         self._fit.lose_rate()
 
-    def _watch_odd(self, block: Block, misfit: Misfit, *, is_odd: bool) -> None:
-        """A force that stays, is no valve's and is the same in every block: the sensor's."""
+    def _watch_odd(self, block: Block, misfit: Misfit, *, is_odd: bool) -> bool:
+        """A force that stays, is no valve's and is the same in every block: the sensor's. True if found."""
         if not is_odd:
             self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
-            return
+            return False
         x, y = misfit.force_m_s2
         self._odd_blocks += 1
         self._odd_x, self._odd_y = self._odd_x + x, self._odd_y + y
         self._odd_square += x * x + y * y
         lasted_s = self._odd_blocks * block.span_s
         if lasted_s < self._config.shift_s or self._shifted or self._valve_findings:
-            return
+            return False
         mean, is_constant = self._odd_force()
         size = math.hypot(*mean)
         if not is_constant or (size > LARGEST_STEP_M_S2 and 0.5 * size * lasted_s**2 < _CARRIED_M):
-            return
+            return False
         detail = (
             f"accelerometers read ({1e3 * mean[0]:.0f}, {1e3 * mean[1]:.0f}) mm/s^2 that no valve explains: "
             "their zero moved, or a steady push"
@@ -267,6 +268,7 @@ class ValveConsistency:
         self._fit.shift_zero(mean)
         self._suspicions.drop()
         self._inquiry.forget()
+        return True
 
     def _odd_force(self) -> tuple[tuple[float, float], bool]:
         """Mean of the force that no valve explains, since it began, and whether it stayed the same."""

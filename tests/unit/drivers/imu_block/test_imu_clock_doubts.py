@@ -6,6 +6,7 @@ from unit.drivers.imu_block.imu_links import Link, fly
 
 from drivers.imu_block.clock import TickClock
 from drivers.imu_block.link_wait import LinkWait
+from drivers.imu_block.protocol import FrameParser, ImuFrame
 
 DRIFTS = (0.0, 50e-6, -50e-6, 200e-6, -200e-6, 1e-3, -1e-3, 5e-3, -5e-3)
 TIMERS_S = (0.001, 0.004, 0.008, 0.016)
@@ -147,6 +148,29 @@ def test_what_nobody_measured_is_no_limit():
     assert stated.wait(0.8e6, 9e6) == (pytest.approx(0.2e6), pytest.approx(0.115e6, rel=0.01))
     assert stated.wait(10.8e6, 9e6) == (4.5e6, pytest.approx(9e6 / 12**0.5))  # no packet lasts so long
     assert stated.wait(2e6, 0.0) == (0.0, 0.0)
+
+
+def test_where_the_stated_timer_would_have_gathered_the_next_frame_packets_hardly_waited():
+    assert LinkWait(16e6).wait(0.8e6, 9e6) == (0.0, pytest.approx(9e6 / 3**0.5))
+    assert LinkWait(16e6).wait(10.8e6, 9e6)[0] == pytest.approx(5.2e6)
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 0.0003])
+def test_a_reply_behind_a_frame_leaves_the_stamps_where_they_were(jitter_s):
+    """A packet that ends in the reply to a command tells no more of the adapter's wait than the others."""
+    reply = bytes(15)
+    link = Link(sample_count=10, timer_s=0.016, drift=0.0, jitter_s=jitter_s, duration_s=20.0).run()
+    parser = FrameParser(2, v1_sample_count=10)
+    clock = TickClock(link.baud, latency_timer_s=0.016)
+    stamps = []
+    for number, (arrival_ns, chunk) in enumerate(link.reads):
+        sent = chunk + reply if number % 25 == 24 else chunk
+        frames = [frame for frame in parser.feed(sent) if isinstance(frame, ImuFrame)]
+        stamps += clock.update(arrival_ns, len(sent), frames)
+    truth_ns = link.truth_ns[len(link.truth_ns) - len(stamps) :]
+    late_s = (np.array([stamp.stamp_ns for stamp in stamps]) - truth_ns)[500:] * 1e-9
+    assert np.abs(late_s).max() < 1.5 * MS
+    assert max(stamp.stamp_sigma_s for stamp in stamps[500:]) < 3.5 * MS
 
 
 def test_a_clock_before_its_first_frame_knows_no_drift():

@@ -69,6 +69,28 @@ def test_a_rest_on_a_slope_gives_bias_less_slope_and_leaves_their_split_open(noi
     assert np.sqrt(P[es.SLOPE_X, es.SLOPE_X]) > 0.9 * noise.slope_sigma_m_s2
 
 
+def test_a_rest_between_fast_fixes_is_learned_packet_by_packet(noise, x):
+    """With 50 fixes and 100 packets a second two packets lie between two fixes: still a rest."""
+    P = np.diag(es.initial_variance(noise))
+    zero = np.zeros(2)
+    for k in range(200):
+        rest = Segment(
+            np.array([0.01, 0.02]) + 0.02 * k, np.full(2, 0.01), zero, np.full(2, 0.02), zero, zero, zero,
+            0.02 * k, 0.02 * k + 0.02,
+        )  # fmt: skip
+        assert measurements.learn_rest(x, P, rest, noise) is not None
+    sigma = noise.acc_density_m_s2_rthz / 0.1 / np.sqrt(400)
+    c, s = np.cos(x[es.THETA]), np.sin(x[es.THETA])
+    gx, gy = x[es.SLOPE_X] + x[es.WAVE_X], x[es.SLOPE_Y] + x[es.WAVE_Y]
+    assert x[es.ACC_BIAS_X] - (c * gx + s * gy) == pytest.approx(0.02, abs=5 * sigma)
+
+
+def test_no_packets_are_no_rest(noise, x):
+    none = np.zeros(0)
+    empty = Segment(none, none, none, none, none, none, none, 0.0, 0.02)
+    assert measurements.learn_rest(x, np.diag(es.initial_variance(noise)), empty, noise) is None
+
+
 def test_a_touched_vehicle_is_not_at_rest(noise, x):
     P = np.diag(es.initial_variance(noise))
     before = x.copy()
