@@ -53,7 +53,8 @@ class FirstOrder:
         lags = np.subtract.outer(np.arange(longest), np.arange(longest))
         self._response = np.where(lags >= 0, (1.0 - self.decay) * self.decay ** np.maximum(lags, 0), 0.0)
         self._memory = self.decay ** np.arange(1, longest + 1)
-        self._state: Array | None = None
+        self._state: Array | None = None  # (channels, 1)
+        self._of_length: dict[int, tuple[Array, Array]] = {}
 
     @property
     def white_gain(self) -> float:
@@ -64,10 +65,14 @@ class FirstOrder:
         """Filter shape (channels, polls), continuing where the last call ended."""
         polls = rows.shape[1]
         if self._state is None:
-            self._state = rows[:, 0].copy()  # power was on long before: no step from zero
-        filtered = rows @ self._response[:polls, :polls].T
-        filtered += np.multiply.outer(self._state, self._memory[:polls])
-        self._state = filtered[:, -1].copy()
+            self._state = rows[:, :1].copy()  # power was on long before: no step from zero
+        of_length = self._of_length.get(polls)
+        if of_length is None:
+            of_length = self._of_length[polls] = self._response[:polls, :polls].T, self._memory[:polls]
+        response, memory = of_length
+        filtered: Array = np.dot(rows, response)
+        filtered += self._state * memory
+        self._state = filtered[:, -1:]
         return filtered
 
 
