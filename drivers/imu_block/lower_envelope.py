@@ -136,11 +136,15 @@ class LowerEnvelope:
 
 def _append_to_hull(hull: list[Point], point: Point) -> None:
     """Add a point that lies not left of the others to their lower convex hull."""
-    if hull and hull[-1].x_ns == point.x_ns:
-        if hull[-1].y_ns <= point.y_ns:
+    x_ns, y_ns = point[:2]
+    if hull and hull[-1][0] == x_ns:
+        if hull[-1][1] <= y_ns:
             return
         hull.pop()
-    while len(hull) > 1 and _turns_clockwise(hull[-2], hull[-1], point):
+    while len(hull) > 1:
+        (ax_ns, ay_ns, _, _), (bx_ns, by_ns, _, _) = hull[-2], hull[-1]
+        if (bx_ns - ax_ns) * (y_ns - ay_ns) > (by_ns - ay_ns) * (x_ns - ax_ns):
+            break  # it turns to the left
         hull.pop()
     hull.append(point)
 
@@ -152,7 +156,3 @@ def _slope_over_the_middle(hull: list[Point]) -> float:
         if b.x_ns >= middle_ns:
             return max(-DRIFT_LIMIT, min(DRIFT_LIMIT, (b.y_ns - a.y_ns) / (b.x_ns - a.x_ns)))
     return 0.0
-
-
-def _turns_clockwise(a: Point, b: Point, c: Point) -> bool:
-    return (b.x_ns - a.x_ns) * (c.y_ns - a.y_ns) <= (b.y_ns - a.y_ns) * (c.x_ns - a.x_ns)

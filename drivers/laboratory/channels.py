@@ -13,6 +13,7 @@ from importlib.metadata import entry_points
 from typing import Protocol, runtime_checkable
 
 from drivers.errors import NotFound
+from drivers.quick_record import quickly_made
 
 ENTRY_POINT_GROUP = "groundstation.laboratories"
 
@@ -32,6 +33,7 @@ class ChannelKind(StrEnum):
     """`drivers.motion_capture.pose.MotionCapturePose`: one rigid body as one frame of the cameras saw it."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
     """Something that reached the host.

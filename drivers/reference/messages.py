@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.quick_record import quickly_made
+
 _ROWS, _COLUMNS = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)  # xx, xy, xh, yy, yh, hh
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ReferencePose:
     """Pose of one vehicle's body origin in the table frame at one moment.

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drivers.quick_record import quickly_made
+
 MAX_STANDARD_ID = 0x7FF  # ISO 11898-1: 11-bit identifier
 MAX_DATA_BYTES = 8  # classic CAN
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class CanFrame:
     """A classic CAN data frame with an 11-bit identifier.

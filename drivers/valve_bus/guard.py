@@ -170,7 +170,10 @@ class Guard:
             messages.append(self._announcement)
             self._announcement = None
         messages.append(command)
-        open_mask = sum(budget.is_open(now_ns) << valve for valve, budget in enumerate(self._budgets))
+        open_mask = 0
+        for valve, budget in enumerate(self._budgets):
+            if budget.is_open(now_ns):
+                open_mask |= 1 << valve
         return GuardOutput(tuple(messages), command, gate, open_mask)
 
     def _advance(self, stamp_ns: int) -> int:
@@ -249,7 +252,5 @@ def _is_well_formed(command: ValveCommand) -> bool:
         0 <= command.counter < COUNTER_MODULUS
         and 0 <= command.pulse_id < COUNTER_MODULUS
         and len(command.on_times_ms) == VALVES
-        and all(
-            isinstance(time_ms, int) and 0 <= time_ms <= MAX_ON_TIME_MS for time_ms in command.on_times_ms
-        )
+        and all(isinstance(ms, int) and 0 <= ms <= MAX_ON_TIME_MS for ms in command.on_times_ms)
     )

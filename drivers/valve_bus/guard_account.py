@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from drivers.quick_record import quickly_made
 from drivers.valve_bus.messages import ValveBusMessage, ValveCommand
 
 
@@ -55,6 +56,7 @@ class GuardCounters:
     clock_went_back: int = 0
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class GuardOutput:
     """What a tick sends and why.

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 
+from drivers.quick_record import quickly_made
 from drivers.valve_bus.frame import CanFrame
 
 VALVES = 8
@@ -83,6 +84,7 @@ class FloatAir:
     counter: int = 0
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ValveCommand:
     """One frame each 20 ms per vehicle.
@@ -99,6 +101,7 @@ class ValveCommand:
     """One per valve, 0..127 ms."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ValveStatus:
     """What a node does, each 20 ms."""

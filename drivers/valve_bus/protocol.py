@@ -42,11 +42,40 @@ from drivers.valve_bus.messages import (
 )
 
 __all__ = [
-    "ARM_ID", "ARM_KEY", "COMMAND_ID", "COMMAND_PERIOD_S", "COUNTER_MODULUS", "EVERY_VEHICLE", "FLOAT_AIR_ID",
-    "HEARTBEAT_ID", "MAX_GRACE_S", "MAX_ON_TIME_MS", "MAX_VEHICLES", "PRESSURE_ID", "SILENCE_CLOSES_S",
-    "SILENCE_LANDS_S", "STATUS_ID", "STOP_ID", "VALVES", "Arm", "CanFrame", "FloatAir",
-    "Heartbeat", "NodeFault", "NodeState", "Stop", "StopReason", "TankPressure", "Undecodable",
-    "ValveBusMessage", "ValveCommand", "ValveStatus", "database", "decode", "encode",
+    "ARM_ID",
+    "ARM_KEY",
+    "COMMAND_ID",
+    "COMMAND_PERIOD_S",
+    "COUNTER_MODULUS",
+    "EVERY_VEHICLE",
+    "FLOAT_AIR_ID",
+    "HEARTBEAT_ID",
+    "MAX_GRACE_S",
+    "MAX_ON_TIME_MS",
+    "MAX_VEHICLES",
+    "PRESSURE_ID",
+    "SILENCE_CLOSES_S",
+    "SILENCE_LANDS_S",
+    "STATUS_ID",
+    "STOP_ID",
+    "VALVES",
+    "Arm",
+    "CanFrame",
+    "FloatAir",
+    "Heartbeat",
+    "NodeFault",
+    "NodeState",
+    "Stop",
+    "StopReason",
+    "TankPressure",
+    "Undecodable",
+    "ValveBusMessage",
+    "ValveCommand",
+    "ValveStatus",
+    "database",
+    "decode",
+    "encode",
+    "may_concern",
 ]  # fmt: skip
 
 STOP_ID = 0x000
@@ -94,6 +123,11 @@ def encode(message: ValveBusMessage) -> CanFrame:
     if isinstance(message, Stop) and message.grace_s == 0.0:
         data = data[:1]  # no grace is no second byte, as before there was one
     return CanFrame(base_id + message.vehicle, data)
+
+
+def may_concern(arbitration_id: int, vehicle: int) -> bool:
+    """Whether a frame may say something to or of a vehicle: it names that one, or all."""
+    return arbitration_id & _VEHICLE_BITS in (vehicle, EVERY_VEHICLE)
 
 
 def decode(frame: CanFrame) -> ValveBusMessage | Undecodable:

@@ -51,9 +51,12 @@ class FirstOrder:
     def __init__(self, bandwidth_hz: float, longest: int) -> None:
         self.decay = math.exp(-2.0 * math.pi * bandwidth_hz * _POLL_S)
         lags = np.subtract.outer(np.arange(longest), np.arange(longest))
-        self._response = np.where(lags >= 0, (1.0 - self.decay) * self.decay ** np.maximum(lags, 0), 0.0)
-        self._memory = self.decay ** np.arange(1, longest + 1)
-        self._state: Array | None = None
+        self._response: Array = np.where(
+            lags >= 0, (1.0 - self.decay) * self.decay ** np.maximum(lags, 0), 0.0
+        )
+        self._memory = np.asarray(self.decay ** np.arange(1, longest + 1), np.float64)
+        self._state: Array | None = None  # (channels, 1)
+        self._of_length: dict[int, tuple[Array, Array]] = {}
 
     @property
     def white_gain(self) -> float:
@@ -64,10 +67,13 @@ class FirstOrder:
         """Filter shape (channels, polls), continuing where the last call ended."""
         polls = rows.shape[1]
         if self._state is None:
-            self._state = rows[:, 0].copy()  # power was on long before: no step from zero
-        filtered = rows @ self._response[:polls, :polls].T
-        filtered += np.multiply.outer(self._state, self._memory[:polls])
-        self._state = filtered[:, -1].copy()
+            self._state = rows[:, :1].copy()  # power was on long before: no step from zero
+        if polls not in self._of_length:
+            self._of_length[polls] = self._response[:polls, :polls].T, self._memory[:polls]
+        response, memory = self._of_length[polls]
+        filtered: Array = np.dot(rows, response)
+        filtered += self._state * memory
+        self._state = filtered[:, -1:]
         return filtered
 
 

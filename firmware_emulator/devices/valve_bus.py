@@ -47,7 +47,7 @@ class ValveBus:
         """When the next frame of a node may reach the host."""
         if self._pending:
             return self._pending[0][0]
-        return min(node.next_output_ns for node in self._nodes) + self._shortest_ns
+        return min([node.next_output_ns for node in self._nodes]) + self._shortest_ns
 
     def receive(self, stamp_ns: int, data: CanFrame) -> None:
         """A frame of the host: every node receives it when it is complete."""

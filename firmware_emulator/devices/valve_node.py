@@ -26,6 +26,7 @@ from drivers.valve_bus.protocol import (
     ValveStatus,
     decode,
     encode,
+    may_concern,
 )
 from firmware_emulator.devices.babble import Babble
 from firmware_emulator.devices.landing_rules import LandingRules
@@ -94,12 +95,11 @@ class ValveNode:
     @property
     def next_ns(self) -> int:
         """Moment of the next thing it does."""
-        next_ns = min(self.next_output_ns, self._dead_man_ns, self._landing.next_ns, self._ailments.next_ns)
-        if self._off_ns:
-            next_ns = min(next_ns, *self._off_ns.values())
+        moments = [self.next_output_ns, self._dead_man_ns, self._landing.next_ns, self._ailments.next_ns]
+        moments += self._off_ns.values()
         if self._inbox:
-            next_ns = min(next_ns, self._inbox[0][0])
-        return next_ns
+            moments.append(self._inbox[0][0])
+        return min(moments)
 
     @property
     def next_output_ns(self) -> int:
@@ -107,8 +107,9 @@ class ValveNode:
         return min(self._status_ns, self._slow_ns, self._babble.next_ns)
 
     def receive(self, stamp_ns: int, frame: CanFrame) -> None:
-        """A frame that is complete on the bus at `stamp_ns`."""
-        self._inbox.append((stamp_ns, frame))
+        """A frame that is complete on the bus at `stamp_ns`; those for others pass its filter by."""
+        if may_concern(frame.arbitration_id, self._index):
+            self._inbox.append((stamp_ns, frame))
 
     def run(self, now_ns: int) -> None:
         """Do what is due at `now_ns`: time-outs first, then what was received, then send."""

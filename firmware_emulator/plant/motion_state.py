@@ -6,6 +6,8 @@ from typing import NamedTuple
 Felt = tuple[float, float, float]
 """What the IMU feels at one poll: rate in rad/s, specific force at its place along body x and y in m/s^2."""
 
+_MAKE = tuple.__new__  # a third of the time of calling a named tuple
+
 
 class Motion(NamedTuple):
     """Centre of mass and heading in the table frame at one moment.
@@ -25,13 +27,16 @@ class Motion(NamedTuple):
         cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
         dx = cosine * point_body_m[0] - sine * point_body_m[1]
         dy = sine * point_body_m[0] + cosine * point_body_m[1]
-        return Motion(
-            self.x_m + dx,
-            self.y_m + dy,
-            self.heading_rad,
-            self.vx_m_s - self.rate_rad_s * dy,
-            self.vy_m_s + self.rate_rad_s * dx,
-            self.rate_rad_s,
+        return _MAKE(
+            Motion,
+            (
+                self.x_m + dx,
+                self.y_m + dy,
+                self.heading_rad,
+                self.vx_m_s - self.rate_rad_s * dy,
+                self.vy_m_s + self.rate_rad_s * dx,
+                self.rate_rad_s,
+            ),
         )
 
 

@@ -19,6 +19,7 @@ FAR_FUTURE_NS = 1 << 62
 
 Wrench = tuple[float, float, float]
 """Force along body x and y in N, torque about the vertical through the centre of mass in N m."""
+_NO_WRENCH: Wrench = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +129,7 @@ class ThrusterBank:
     @property
     def is_quiet(self) -> bool:
         """Whether no force acts and none is building up."""
-        return self.wrench == (0.0, 0.0, 0.0) and self.target == (0.0, 0.0, 0.0)
+        return self.wrench == _NO_WRENCH and self.target == _NO_WRENCH
 
     @property
     def next_event_ns(self) -> int:

@@ -94,7 +94,13 @@ class _Indices(dict[str, int]):
 
 
 class JournalWriter:
-    """Collects the entries of one process between two publications."""
+    """Collects the entries of one process between two publications.
+
+    Class attributes:
+        is_kept: Whether entries are kept; who has thousands of them a second asks before it notes them.
+    """
+
+    is_kept: ClassVar[bool] = True
 
     def __init__(self) -> None:
         self._names = _Indices()
@@ -139,6 +145,8 @@ class JournalWriter:
 
 class NoJournal(JournalWriter):
     """Keeps nothing: for runs that nobody records, such as campaigns."""
+
+    is_kept = False
 
     def note(
         self,

@@ -6,6 +6,7 @@ Tuples of floats rather than arrays: the law runs on three axes, and an array of
 import math
 from dataclasses import dataclass, replace
 
+from drivers.quick_record import quickly_made
 from groundstation.frames import wrap_angle
 
 LENGTH_BOUND_M = 1e6  # far beyond any table: keeps sums finite whatever comes in
@@ -45,6 +46,7 @@ def _refuse_non_finite(what: str, *values: float) -> None:
         raise ValueError(f"{what} must be finite, found {values}")
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ControlState:
     """Estimated state of one mock-up at one moment.
@@ -142,6 +144,7 @@ class Goal:
         )
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class BodyWrench:
     """Force through the centre of mass, body axes, and torque about the vertical."""

@@ -40,7 +40,9 @@ class HoldUp:
         recent = self._recent
         while recent and arrived_ns - recent[0][0] > RECENT_NS:
             recent.popleft()
-        recent.append((arrived_ns, late_ns - self._usual_ns))
+        excess_ns = late_ns - self._usual_ns
+        if excess_ns > self._spread_ns:  # what is less counts for nothing
+            recent.append((arrived_ns, excess_ns))
 
     def excess_s(self, now_ns: int) -> float:
         """How much later than usual something that arrives now may be, s; 0 where nothing is held up.
@@ -51,6 +53,8 @@ class HoldUp:
         if not self._stamp_ns:
             return 0.0
         due_ns = self._stamp_ns + self._period_ns + self._usual_ns
-        late = [excess for arrived_ns, excess in self._recent if now_ns - arrived_ns <= RECENT_NS]
-        excess_ns = max(now_ns - due_ns, *late, 0.0)
+        excess_ns = max(now_ns - due_ns, 0.0)
+        for arrived_ns, late_ns in self._recent:
+            if late_ns > excess_ns and now_ns - arrived_ns <= RECENT_NS:
+                excess_ns = late_ns
         return excess_ns * 1e-9 if excess_ns > self._spread_ns else 0.0

@@ -15,6 +15,7 @@ from groundstation.recording.writer import Recorder
 from groundstation.rig.provenance import recording_info
 from groundstation.runners.lockstep import LockstepRunner, Observer
 from groundstation.runners.make_runner import make_runner, seed_of
+from groundstation.runners.rare_collection import rare_collection
 from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.ledger import Ledger
 
@@ -114,12 +115,13 @@ def run_until(
     def report(now_ns: int) -> None:
         progress(f"{now_ns * 1e-9:.1f} s of {seconds:g} s", now_ns * 1e-9)
 
-    if is_over is None:
-        runner.run(until_ns, report)
-        return
-    while runner.now_ns < until_ns and not is_over():
-        runner.run(min(STEP_NS, until_ns - runner.now_ns))
-        report(runner.now_ns)
+    with rare_collection():
+        if is_over is None:
+            runner.run(until_ns, report)
+            return
+        while runner.now_ns < until_ns and not is_over():
+            runner.run(min(STEP_NS, until_ns - runner.now_ns))
+            report(runner.now_ns)
 
 
 def _end(recorder: Recorder) -> None:

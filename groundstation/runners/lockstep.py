@@ -159,8 +159,9 @@ class LockstepRunner:
 
     def publish(self, delivered: Delivered) -> None:
         """See ``Transport``."""
-        envelope = delivered.envelope
-        self._push(envelope.publish_ns, envelope.topic.rank, delivered)
+        topic, _, _, publish_ns = delivered[0][:4]
+        self._count += 1
+        heapq.heappush(self._heap, (publish_ns, topic.rank, self._count, delivered))
 
     def call_back(self, stamp_ns: int, slot: Slot) -> None:
         """See ``Transport``."""

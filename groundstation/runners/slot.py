@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from groundstation.bus.envelope import Delivered, Envelope
+from groundstation.bus.envelope import Cause, Delivered, Envelope
 from groundstation.bus.journal import JournalWriter, Kind
 from groundstation.declarations.calls import node_error
 from groundstation.declarations.errors import NodeError
@@ -95,6 +95,7 @@ class Slot:
         busy_until_ns: When a busy node is free again.
         waiting: What waits for a busy node.
         has_failed: It raised something: it is called no more, not even to stop.
+        is_journaled: Whether anybody reads the journal.
     """
 
     key: str
@@ -107,8 +108,12 @@ class Slot:
     busy_until_ns: int = 0
     waiting: list[Delivered] = field(default_factory=list)
     has_failed: bool = False
+    is_journaled: bool = field(init=False)
     _newest: Envelope | None = None  # of the node's trigger
     _streams: dict[tuple[type[Message], str], Stream] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.is_journaled = self.journal.is_kept
 
     def start(self, now_ns: int) -> list[Delivered]:
         """Journal the start and collect what the node publishes first."""
@@ -121,17 +126,21 @@ class Slot:
     def receive(self, delivered: Delivered, now_ns: int) -> list[Delivered]:
         """Deliver one message; the outputs carry the stamps at which they are to be published."""
         envelope, payload = delivered
-        self.journal.note(_INPUT, self.key, envelope.topic.noun, envelope.owner, envelope.sequence, now_ns)
-        if type(payload) is self.node.trigger and envelope.owner == self.node.vehicle:
+        node = self.node
+        if self.is_journaled:
+            topic, owner, sequence = envelope[:3]
+            self.journal.note(_INPUT, self.key, topic.noun, owner, sequence, now_ns)
+        if type(payload) is node.trigger and envelope.owner == node.vehicle:
             self._newest = envelope
         try:
-            return self._wrap(self.node.receive(payload, now_ns), now_ns, envelope)
+            return self._wrap(node.receive(payload, now_ns), now_ns, envelope)
         except (Exception, SystemExit) as error:
             raise self._failed(error) from error
 
     def tick(self, now_ns: int) -> list[Delivered]:
         """Let time pass; what is made then was triggered by the newest message of the node's trigger."""
-        self.journal.note(_TICK, self.key, "", self.process, 0, now_ns)
+        if self.is_journaled:
+            self.journal.note(_TICK, self.key, "", self.process, 0, now_ns)
         try:
             return self._wrap(self.node.tick(now_ns), now_ns, self._newest)
         except (Exception, SystemExit) as error:
@@ -161,14 +170,18 @@ class Slot:
             return []
         wall_ns = time.perf_counter_ns() - begin_ns if self.measure else 0
         publish_ns = now_ns + wall_ns + self.timing.busy_ns + self.timing.late_ns
-        trigger = None if answered is None else answered.as_cause()
-        new = tuple.__new__  # a third of the time of calling a named tuple
+        new, streams = tuple.__new__, self._streams  # a third of the time of calling a named tuple
+        trigger = None
+        if answered is not None:
+            topic, owner, sequence = answered[:3]
+            trigger = new(Cause, (topic.noun, owner, sequence))
         out = []
         for payload in payloads:
-            stream = self._streams.get((type(payload), payload.vehicle)) or self._open(payload)
-            stream.last += 1
-            topic, owner, sequence = stream.topic, stream.owner, stream.last
-            self.journal.note(_OUTPUT, self.key, topic.noun, owner, sequence, now_ns, wall_ns)
+            stream = streams.get((type(payload), payload.vehicle)) or self._open(payload)
+            topic, owner = stream.topic, stream.owner
+            sequence = stream.last = stream.last + 1
+            if self.is_journaled:
+                self.journal.note(_OUTPUT, self.key, topic.noun, owner, sequence, now_ns, wall_ns)
             envelope = new(Envelope, (topic, owner, sequence, publish_ns, wall_ns, trigger))
             out.append(new(Delivered, (envelope, payload)))
         return out

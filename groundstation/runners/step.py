@@ -24,6 +24,9 @@ JOURNAL_PERIOD_NS = 100_000_000
 Address = tuple[str, str]
 """A topic as nodes receive it: noun, and vehicle of the payload."""
 
+_Taker = tuple[Slot, Pace | None]
+"""Who receives a topic, with the pace of who takes it paced."""
+
 
 class Transport(Protocol):
     """What a runner does for the step."""
@@ -66,9 +69,7 @@ class Step:
         self._transport = transport
         self._trouble: NodeError | None = None
         self._receivers: dict[Address, list[Slot]] = {}
-        self._takers: dict[
-            Address, list[tuple[Slot, Pace | None]]
-        ] = {}  # with the pace of who takes it paced
+        self._takers: dict[Address, list[_Taker]] = {}
         for slot in slots:
             for kind, address in inputs_of(slot.node):
                 pace = Pace(kind.TOPIC.pace_ns) if slot.node.takes_paced(kind, address[1]) else None
@@ -127,7 +128,8 @@ class Step:
         topic = payload.TOPIC
         owner = owner_of(topic, payload, self.process)
         sequence = self._sequences.next(topic, owner)
-        self._journal.note(Kind.PORT, None, topic.noun, owner, sequence, now_ns)
+        if self._journal.is_kept:
+            self._journal.note(Kind.PORT, None, topic.noun, owner, sequence, now_ns)
         self._transport.publish(Delivered(Envelope(topic, owner, sequence, now_ns), payload))
 
     def deliver(self, delivered: Delivered, now_ns: int) -> None:
@@ -158,10 +160,14 @@ class Step:
         return Delivered(Envelope(topic, self.process, sequence, now_ns), payload)
 
     def _give(self, address: Address, delivered: Delivered, now_ns: int) -> None:
+        publish = self._transport.publish
         for slot, pace in self._takers.get(address, ()):
             if pace is not None and not pace.passes(delivered.envelope.publish_ns):
                 continue
-            if not slot.timing.busy_ns or (slot.busy_until_ns <= now_ns and not slot.waiting):
+            if not slot.timing.busy_ns:
+                for made in slot.receive(delivered, now_ns):
+                    publish(made)
+            elif slot.busy_until_ns <= now_ns and not slot.waiting:
                 self._hand_over(slot, delivered, now_ns)
             else:
                 self._wait(slot, delivered, now_ns)
@@ -177,12 +183,11 @@ class Step:
         slot.waiting.append(delivered)
 
     def _hand_over(self, slot: Slot, delivered: Delivered, now_ns: int) -> None:
+        """Give a message to a node that it keeps busy."""
         made = slot.receive(delivered, now_ns)
-        if slot.timing.busy_ns:
-            slot.busy_until_ns = now_ns + slot.timing.busy_ns
-            self._transport.call_back(slot.busy_until_ns, slot)
-        if made:
-            self._publish(made)
+        slot.busy_until_ns = now_ns + slot.timing.busy_ns
+        self._transport.call_back(slot.busy_until_ns, slot)
+        self._publish(made)
 
     def _publish(self, made: Iterable[Delivered]) -> None:
         publish = self._transport.publish

@@ -28,6 +28,7 @@ LOGGED: tuple[type[Message], ...] = (
     InjectedFailure, Marker, ScenarioStatus,
 )  # fmt: skip
 """Classes that a log takes; others may be given."""
+_LOGGED = frozenset(LOGGED)
 
 
 @dataclass(slots=True)
@@ -79,6 +80,8 @@ class FlightLog:
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message that was published at a moment."""
         self.last_ns = now_ns
+        if type(message) not in _LOGGED:
+            return
         if isinstance(message, ScenarioStatus):
             before = self.status.state if self.status is not None else WAITING
             self.was_started_again |= before != WAITING and message.state == WAITING

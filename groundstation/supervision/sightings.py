@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from drivers.quick_record import quickly_made
 from groundstation.control.corridor import Docking, may_touch
 from groundstation.control.edge import EdgeVerdict, edge_outlook
 from groundstation.control.keep_in import KeepIn
@@ -52,6 +53,7 @@ UNDERVOLTAGE, COIL_FAULT = 1, 0x80
 """Fault bits of the valve node: the lowest, and the one by which the station says that a coil is reported."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Seen:
     """The newest estimate of a vehicle, as it arrived.
@@ -69,6 +71,7 @@ class Seen:
     sigma: tuple[float, float, float]
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class NodeSeen:
     """The newest status of the valve node, as it arrived, and how many frames a second its bus carries."""

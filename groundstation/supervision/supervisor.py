@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+from drivers.quick_record import quickly_made
 from groundstation.supervision.arming import Question, objections
 from groundstation.supervision.fault_board import FaultBoard, Standing
 from groundstation.supervision.faults import Clears, Response
@@ -14,6 +15,7 @@ LIFT_S = 0.3
 RESTARTED = "commands_restarted"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Ruling:
     """What holds now: what guard, multiplexer and valve writer obey.

@@ -17,7 +17,7 @@ from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.messages import ControlStatus, Wrench
-from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 from groundstation.supervision.apart import Others
 
@@ -141,9 +141,7 @@ class ControllerNode(Node):
             self._others.positions_table_m[message.vehicle] = message.position_table_m
         if message.status != "flying" or message.vehicle not in self._followed:
             return
-        state = ControlState(
-            message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
-        )
+        state = control_state(message)
         self._states[message.vehicle] = (message.stamp_ns, state)
         if message.vehicle == self.vehicle:
             self._own_rate.add(state)

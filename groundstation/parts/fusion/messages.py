@@ -1,8 +1,10 @@
 """What fusion believes, and what became of each fix."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
+from groundstation.control.state import ControlState
 from groundstation.declarations.message import (
     F64,
     I64,
@@ -41,6 +43,18 @@ class VehicleState(Message):
     pose_sigma: Float64x3
     status: Text
     fix_stamp_ns: I64
+
+
+@lru_cache(maxsize=16)
+def control_state(message: VehicleState) -> ControlState:
+    """The state as control reads it, made once for all nodes of a process that receive the message.
+
+    Raises:
+        ValueError: A component is not finite.
+    """
+    return ControlState(
+        message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 
 from groundstation.control.edge import braking_to_count_on
-from groundstation.control.state import ControlState
 from groundstation.control.valve_health import health_of
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
@@ -12,7 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer, shown_name
 from groundstation.parts.control.messages import Wrench
-from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.memory import memory_of
@@ -218,7 +217,4 @@ class SupervisorNode(Node):
 
 
 def _seen(message: VehicleState, now_ns: int) -> Seen:
-    state = ControlState(
-        message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
-    )
-    return Seen(now_ns, state, message.status, message.pose_sigma)
+    return Seen(now_ns, control_state(message), message.status, message.pose_sigma)

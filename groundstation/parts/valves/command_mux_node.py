@@ -17,7 +17,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, Request, answer
 from groundstation.parts.control.messages import Wrench
-from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.fusion.messages import VehicleState, control_state
 from groundstation.parts.outside.messages import OutsideWrench
 from groundstation.parts.supervision.messages import Supervision, ValveShares
 from groundstation.parts.valves.actions import PUSH
@@ -136,9 +136,7 @@ class CommandMuxNode(Node):
     def _see(self, message: VehicleState, now_ns: int) -> None:
         if message.status not in KNOWN_PLACES:
             return
-        state = ControlState(
-            message.position_table_m, message.velocity_table_m_s, message.heading_rad, message.rate_rad_s
-        )
+        state = control_state(message)
         is_flown = message.status == "flying"
         sigma_m = message.pose_sigma[:2]
         if message.vehicle != self.vehicle:

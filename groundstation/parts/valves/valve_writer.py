@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from drivers.valve_bus import messages as bus
 from drivers.valve_bus.frame import CanFrame
-from drivers.valve_bus.protocol import decode, encode
+from drivers.valve_bus.protocol import decode, encode, may_concern
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.supervision.messages import StopPress, Supervision
@@ -71,6 +71,8 @@ class ValveWriter(Node):
         if now_ns - self._counted_ns >= COUNTED_NS:
             self._bus_rate_hz = self._frames * 1e9 / (now_ns - self._counted_ns)
             self._frames, self._counted_ns = 0, now_ns
+        if not may_concern(message.arbitration_id, self._index):
+            return
         reported = decode(CanFrame(message.arbitration_id, message.data))
         match reported:
             case bus.Stop() if reported.vehicle in (self._index, bus.EVERY_VEHICLE):
