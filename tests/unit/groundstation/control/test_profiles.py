@@ -88,7 +88,7 @@ class HeldFirst:
 @pytest.mark.parametrize("slope_m_s2", [0.0, 0.005, -0.005])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_fast_way_takes_hardly_longer_than_bang_bang_and_does_not_overshoot(fly, world, slope_m_s2, seed):
-    """Up and down half a milliradian, with weak valves, and the harsh estimate of conftest without its jumps."""
+    """Up and down 0.5 mrad, weak valves, the harsh estimate of conftest without its jumps."""
     quiet = world(
         slope_table_m_s2=(slope_m_s2, 0.0), fix_sigma_m=0.0, speed_sigma_m_s=0.0, rate_noise_sigma_rad_s=0.0
     )
