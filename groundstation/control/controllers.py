@@ -23,7 +23,8 @@ from groundstation.control.keep_in import KeepIn
 from groundstation.control.path import PathConfig, PathFollowing
 from groundstation.control.state import Vector2
 from groundstation.control.station import StationConfig, StationKeeping
-from groundstation.control.trajectory import Trajectory, TrajectoryConfig
+from groundstation.control.trajectory import Trajectory
+from groundstation.control.trajectory_config import TrajectoryConfig
 from groundstation.control.tumble import Tumble, TumbleConfig
 from groundstation.control.vehicle import VehicleModel
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.control.controllers import controllers
-from groundstation.control.trajectory import TrajectoryConfig
+from groundstation.control.trajectory_config import TrajectoryConfig
 from groundstation.parts.control.sections import config_of, control_of, dockings_of, neighbours_of
 from groundstation.scenario.compiling import groups_of
 from groundstation.scenario.limits import expanded
