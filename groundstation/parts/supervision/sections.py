@@ -14,7 +14,7 @@ class SupervisionOfType(Section):
 
     Attributes:
         learns_valves: Thrust and dead time of each valve are learned in flight (`ValvesLearned`); it takes
-            about 1 % of a core.
+            about 3 % of a core.
     """
 
     learns_valves: bool = False
