@@ -13,7 +13,8 @@ help:
 	@echo "make test-all  the slow tests too"
 	@echo "make check     format, lint, types, import contracts"
 	@echo "make bench     measure what docs/benchmarks.md reports"
-	@echo "make bench-full   every fault over 20 seeds, 10 h of healthy flight, 1000 hostile sequences; goes on where it was ended"
+	@echo "make bench-full   every fault over 20 seeds, 10 h of healthy flight, 1000 hostile sequences, formation flight over"
+	@echo "                  100 seeds; goes on where it was ended"
 	@echo "make mutate    change the safety path 200 times; a test must notice each change"
 
 $(STAMP): pyproject.toml tools/requirements.lock
@@ -62,6 +63,7 @@ bench-full: $(CORE)
 	@$(BIN)/python tools/fault_campaign.py --seeds 20 --out build/fault_campaign.jsonl
 	@$(BIN)/python tools/fault_campaign.py --only healthy --seeds 60 --after 600 --out build/healthy_flights.jsonl
 	@$(BIN)/python tools/hostile_commands.py --seeds 1000 --out build/hostile_commands.jsonl
+	@$(BIN)/python tools/formation_flights.py --seeds 100 --out build/formation_flights.jsonl
 
 mutate: $(CORE)
 	@$(BIN)/python tools/mutate.py --sample 200 --seed 1 --write docs/benchmarks.md

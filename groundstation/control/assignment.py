@@ -8,7 +8,7 @@ Assignment and Planning of Trajectories for Multiple Robots, Int. J. Robotics Re
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -62,7 +62,7 @@ def reassigned(
     places_m: Sequence[Vector2],
     rule: Rule,
     *,
-    is_blocked: bool = True,
+    blocked: Collection[int] = (),
 ) -> dict[str, int]:
     """Places of those that are left after some ships have fallen out.
 
@@ -72,13 +72,15 @@ def reassigned(
         places_m: The places, those that matter most first.
         rule: ``keep``: everybody stays and the place is empty. ``fill``: the first places are filled, at the
             least sum of squared distances, so that the last ones fall empty.
-        is_blocked: Who fell out still stands at its place, so that nobody else can have it.
+        blocked: Numbers of places nobody else can have, since somebody lies there.
     """
     left = {ship: place for ship, place in assigned.items() if ship not in absent}
     if rule == "keep":
         return left
-    taken = {place for ship, place in assigned.items() if ship in absent} if is_blocked else set()
+    taken = set(blocked) - set(left.values())
     free = [number for number in range(len(places_m)) if number not in taken][: len(left)]
+    if len(free) < len(left):
+        return left
     found = assign(
         {ship: places_m[place] for ship, place in left.items()}, [places_m[number] for number in free]
     )

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from groundstation.control.state import BodyWrench, ControlState, Goal
+from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
 
 NO_NEIGHBOURS: Mapping[str, ControlState] = MappingProxyType({})
 LONGEST_SPAN_S = 1.0
@@ -57,4 +57,16 @@ class Controller(Protocol):
 
         Raises:
             ValueError: `dt_s` is not positive and finite.
+        """
+
+
+@runtime_checkable
+class KeepsPlaces(Protocol):
+    """What a controller has beside that, which cares for ships that come down."""
+
+    def see_fallen(self, places_m: Mapping[str, Vector2]) -> None:
+        """Take who of its neighbours is down by its supervisor's ruling, and where it lies.
+
+        Args:
+            places_m: All that are down at this moment, by name; table frame. Called before each `update`.
         """

@@ -23,7 +23,8 @@ from groundstation.control.keep_in import KeepIn
 from groundstation.control.path import PathConfig, PathFollowing
 from groundstation.control.state import Vector2
 from groundstation.control.station import StationConfig, StationKeeping
-from groundstation.control.trajectory import Trajectory, TrajectoryConfig
+from groundstation.control.trajectory import Trajectory
+from groundstation.control.trajectory_config import TrajectoryConfig
 from groundstation.control.tumble import Tumble, TumbleConfig
 from groundstation.control.vehicle import VehicleModel
 
@@ -66,6 +67,7 @@ class ControllerRow(Generic[ConfigT]):
         neighbours: Other vehicles whose states it wants, by its parameters.
         of_rig: Parameters that the rig states already, from its name, the places to hold of all that
             fly this law, and the places to keep out of; the file's own go before them.
+        led_by: Those of them without whom it has no place of its own, by its parameters.
         docks_with: Whom it may touch and in which corridor, by its parameters; None where nobody.
         has_program: It knows by itself where to go; a goal interrupts it until it is resumed.
         is_built_in: It is of the tree; others run in a process of their own.
@@ -76,6 +78,7 @@ class ControllerRow(Generic[ConfigT]):
     make: Callable[[ConfigT, VehicleModel, KeepIn | None], Controller]
     example: Mapping[str, Any] = field(default_factory=dict)
     neighbours: Callable[[ConfigT], tuple[str, ...]] = _nobody
+    led_by: Callable[[ConfigT], tuple[str, ...]] = _nobody
     of_rig: Callable[[str, Mapping[str, Vector2], Obstacles], Mapping[str, Any]] = _nothing
     docks_with: Callable[[ConfigT], tuple[str, Corridor] | None] = _with_nobody
     has_program: bool = False
@@ -106,6 +109,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             Formation,
             {"neighbours": {"leader": {"offset_m": (-0.6, 0.0)}}, "goal_weight": 1.0},
             lambda config: tuple(config.neighbours),
+            led_by=lambda config: () if config.goal_weight else tuple(config.neighbours),
         ),
         "path": ControllerRow(
             "follow waypoints, the perimeter or a figure eight",
@@ -127,6 +131,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             Follow,
             {"leader": "leader", "distance_m": 0.8},
             lambda config: (config.leader,),
+            led_by=lambda config: (config.leader,),
             has_program=True,
         ),
         "trajectory": ControllerRow(
@@ -139,7 +144,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
                 "places_m": ((1.2, 0.0), (0.0, 0.0)),
             },
             lambda config: tuple(name for name in config.starts_m if name != config.ship),
-            lambda vehicle, fleet_m, obstacles_m: {
+            of_rig=lambda vehicle, fleet_m, obstacles_m: {
                 "ship": vehicle,
                 "starts_m": fleet_m,
                 "obstacles_m": obstacles_m,
@@ -152,6 +157,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
             Dock,
             {"target": "leader"},
             lambda config: (config.target,),
+            led_by=lambda config: (config.target,),
             docks_with=lambda config: (config.target, config.corridor()),
             has_program=True,
         ),

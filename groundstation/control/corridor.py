@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from groundstation.control.state import ControlState, Vector2, rotate
 
+_GATE = 0.8  # of the corridor's length: the gate lies inside, so that nobody keeps it away from there
 _TOO_FAST = 1.6  # times the speed that is meant at a distance ...
 _TOO_FAST_M_S = 0.006  # ... and what estimates are off by
 
@@ -55,6 +56,11 @@ class Corridor:
     approach_m_s: float
     contact_m_s: float
     slowing_m_s2: float
+
+    @property
+    def gate_m(self) -> float:
+        """From the target's centre along the axis: there a ship waits before it comes in."""
+        return self.contact_m + _GATE * self.length_m
 
     def relative(self, ship: ControlState, target: ControlState) -> Relative:
         """Where a ship is and how it moves, seen from the axis."""

@@ -21,7 +21,6 @@ from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2,
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
 from groundstation.frames import wrap_angle
 
-_GATE = 0.8  # of the corridor's length: the gate lies inside, so that nobody keeps it away from there
 _STEP_RAD = math.radians(25.0)  # ahead of it on the way round to the gate
 _IN_LINE_RAD = math.radians(15.0)
 _CALM_M, _CALM_M_S, _CALM_RAD, _CALM_S = 0.012, 0.008, math.radians(2.0), 3.0
@@ -96,7 +95,7 @@ class Dock:
     """
 
     def __init__(self, config: DockConfig, vehicle: VehicleModel, keep_in: KeepIn | None = None) -> None:
-        self._gate_m = config.contact_m + _GATE * config.length_m
+        self._gate_m = config.corridor().gate_m
         if self._gate_m < NEAREST_M:
             raise ValueError(
                 f"length_m: the gate would be {self._gate_m:.2f} m from it, give {NEAREST_M:g} m"

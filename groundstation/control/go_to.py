@@ -1,9 +1,8 @@
 """Go to a pose: a reference within speed and acceleration limits, followed by station keeping.
 
 Three profiles. ``limited``: a trapezoid within the stated speed and acceleration. ``time``: as fast as the
-valves and the slope allow along this way, switching from acceleration to braking on the curve v = sqrt(2 a s)
-of the phase plane (M. Athans, P. L. Falb, Optimal Control, 1966, chapter 7), a little early, so that the rest
-of the valves' force corrects. ``gas``: push, coast, push against it, in the stated time (`coasting`).
+valves and the slope allow along this way (`fastest_way`); the last centimetres are braked evenly, so that the
+reference ends at the goal. ``gas``: push, coast, push against it, in the stated time (`coasting`).
 
 The reference starts where the mock-up is and moves inside the keep-in region, which is convex, so that a
 straight way between two of its points stays inside. If the mock-up falls far behind (pushed, valves weak),
@@ -20,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from groundstation.control.authority import Authority, authority_along
 from groundstation.control.coasting import CoastingWay, least_gas
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
+from groundstation.control.fastest_way import BRAKE_SHARE, fastest_acceleration
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.reference import MotionLimits, PointReference
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
@@ -28,18 +28,16 @@ from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.frames import wrap_angle
 
-PUSH_SHARE = 0.95
-"""Of the valves' force, for speeding up: valves differ, and sag when two are open."""
-BRAKE_SHARE = 0.75
-"""For braking, by which it begins: what is left stops a mock-up that comes too fast."""
 LEAD_S = 0.1
 """Age of a state and half a period of pulses: the way is judged where the next push finds the mock-up."""
+LEAST_SHARE = 0.3
+"""Of the brakes, for an even end: a slower one takes too long."""
 GAS_SHARE = 0.9
 """For the pushes before and after coasting."""
 TURNS_RAD = math.radians(5.0)
 """Who turns more on the way counts on what the valves give in every direction."""
-NEARLY_THERE_M = 0.05
-"""From here on a fast way is tracked like any other."""
+NEARLY_THERE_M = 0.015
+"""From here on a fast way is braked evenly to its end, and tracked like any other."""
 LEAST_WAY_M, AT_REST_M_S = 0.02, 1e-3
 """A shorter way, or one that begins in motion, is not planned for coasting."""
 
@@ -95,11 +93,13 @@ class GoTo:
         )
         self._way: PointReference | CoastingWay | None = None
         self._turn: PointReference | None = None
+        self._is_fast = False
 
     def reset(self) -> None:
         """Forget way and disturbances; the next update starts from the state it gets."""
         self._station.reset()
         self._way = self._turn = None
+        self._is_fast = False
 
     @property
     def disturbance_table_m_s2(self) -> Vector2:
@@ -133,18 +133,16 @@ class GoTo:
         aim_rad = turn.position[0] + wrap_angle(goal.heading_rad - turn.position[0])
         turn.advance((aim_rad, 0.0), (goal.rate_rad_s, 0.0), dt_s)
         self._way, self._turn = way, turn
+        # who has arrived is told the goal's own acceleration, beside the last of the way's braking
         follows = way.is_at_goal and isinstance(way, PointReference)
-        place, velocity = way.position, way.velocity
-        if self._config.profile == "time" and math.dist(place, goal.position_table_m) > NEARLY_THERE_M:
-            # the way is made anew from the state: nothing to catch up with, only the acceleration counts
-            place, velocity = state.position_table_m, state.velocity_table_m_s
+        its = goal.acceleration_table_m_s2 if follows else (0.0, 0.0)
         return Goal(
-            place,
+            way.position,
             wrap_angle(turn.position[0]),
-            velocity,
+            way.velocity,
             turn.velocity[0],
-            goal.acceleration_table_m_s2 if follows else way.acceleration,
-            goal.angular_acceleration_rad_s2 if turn.is_at_goal else turn.acceleration[0],
+            (way.acceleration[0] + its[0], way.acceleration[1] + its[1]),
+            turn.acceleration[0] + (goal.angular_acceleration_rad_s2 if turn.is_at_goal else 0.0),
         )
 
     def _moved(self, state: ControlState, goal: Goal, dt_s: float) -> PointReference | CoastingWay:
@@ -161,28 +159,41 @@ class GoTo:
             way.advance(dt_s)
             return way
         if self._config.profile == "time" and not way.is_at_goal:
-            way = self._fastest(way, state, goal, there)
+            return self._fastest(way, state, goal, there, dt_s)
         way.advance(there, velocity, dt_s)
         return way
 
     def _fastest(
-        self, way: PointReference, state: ControlState, goal: Goal, there: Vector2
+        self, way: PointReference, state: ControlState, goal: Goal, there: Vector2, dt_s: float
     ) -> PointReference:
-        """The next step at the valves' limits, judged where the mock-up is, until it is nearly there.
+        """The next step at the valves' limits, judged where the next push finds the mock-up.
 
-        A reference that runs ahead of valves which are weaker than stated would brake too late.
+        The way begins anew there each time: nothing to catch up with, only the acceleration counts. A
+        reference that runs ahead of valves which are weaker than stated would brake too late.
         """
-        here = state.carried(LEAD_S).position_table_m
-        if math.dist(here, there) <= NEARLY_THERE_M:
+        here, its = state.carried(LEAD_S).position_table_m, goal.velocity_table_m_s
+        is_near = math.dist(here, there) <= NEARLY_THERE_M
+        if is_near and not self._is_fast:
+            way.advance(there, its, dt_s)
             return way
         along = self._authority(here, there, state, goal)
+        speed = state.velocity_table_m_s
+        relative = (speed[0] - its[0], speed[1] - its[1])
+        even = (relative[0] ** 2 + relative[1] ** 2) / (2.0 * math.dist(state.position_table_m, there))
         limits = replace(
             self._limits,
             speed=self._config.fastest_m_s,
-            acceleration=along.accelerating(PUSH_SHARE),
-            braking=along.braking(BRAKE_SHARE),
+            acceleration=along.accelerating(BRAKE_SHARE),
+            braking=min(max(even, along.braking(LEAST_SHARE)), along.braking(1.0)),
         )
-        return PointReference(limits, here, state.velocity_table_m_s)
+        way = PointReference(limits, state.position_table_m, speed)
+        self._is_fast = not is_near
+        if is_near:
+            way.advance(there, its, dt_s)
+        else:
+            to_go = (there[0] - here[0], there[1] - here[1])
+            way.acceleration = fastest_acceleration(to_go, relative, along, self._config.fastest_m_s)
+        return way
 
     def _coasting(
         self, way: PointReference | CoastingWay, state: ControlState, goal: Goal, there: Vector2

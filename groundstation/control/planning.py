@@ -46,6 +46,18 @@ def plan(asked: Reconfiguration) -> Plan:
     )
 
 
+def straight_or_planned(asked: Reconfiguration) -> Plan:
+    """Straight ways where they are safe, which takes milliseconds, otherwise as `plan`.
+
+    Raises:
+        NoSafeWayError: See `plan`.
+    """
+    _check(asked)
+    family = RestToRest(asked.duration_s or shortest_s(asked), _SPANS)
+    straight = Plan(family, _guess(asked, family, 0.0))
+    return plan(asked) if objection(asked, straight) else straight
+
+
 def _from_guess(asked: Reconfiguration, family: RestToRest, bow: float) -> tuple[Plan | None, str]:
     """A safe plan, or why none came of this guess."""
     rounds, control_m, reason = Rounds(asked, family), _guess(asked, family, bow), ""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from groundstation.control.state import Vector2, limit_length
 
 _BRAKING_SHARE = 0.9  # of the acceleration: what is left corrects the last steps
-_ARRIVAL_SHARE = 0.1  # of the capture distance: a step that station keeping does not notice
+_ARRIVAL_SHARE = 0.1  # of the capture distance and its speed: a step that station keeping does not notice
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +61,11 @@ class PointReference:
         relative = (self.velocity[0] - goal_velocity[0], self.velocity[1] - goal_velocity[1])
         step = limits.acceleration * dt_s
         # hysteresis: arriving needs a tenth of what losing a reached goal does
-        capture = limits.capture * (1.0 if self.is_at_goal else _ARRIVAL_SHARE)
-        reach = max(step, math.sqrt(2.0 * limits.acceleration * capture))
+        share = 1.0 if self.is_at_goal else _ARRIVAL_SHARE
+        capture = share * limits.capture
+        reach = max(step, share * math.sqrt(2.0 * limits.acceleration * limits.capture))
         if distance <= max(capture, 0.5 * step * dt_s) and math.hypot(*relative) <= reach:
-            self._arrive(goal, goal_velocity)
+            self._arrive(goal, goal_velocity, dt_s)
             return
         self.is_at_goal = False
         braking = _BRAKING_SHARE * limits.acceleration if limits.braking is None else limits.braking
@@ -85,6 +86,11 @@ class PointReference:
             self.position[1] + self.velocity[1] * dt_s,
         )
 
-    def _arrive(self, goal: Vector2, goal_velocity: Vector2) -> None:
+    def _arrive(self, goal: Vector2, goal_velocity: Vector2, dt_s: float) -> None:
+        if self.is_at_goal:
+            self.acceleration = (0.0, 0.0)
+        else:  # the last of the braking
+            change = (goal_velocity[0] - self.velocity[0], goal_velocity[1] - self.velocity[1])
+            self.acceleration = (change[0] / dt_s, change[1] / dt_s)
         self.is_at_goal = True
-        self.position, self.velocity, self.acceleration = goal, goal_velocity, (0.0, 0.0)
+        self.position, self.velocity = goal, goal_velocity

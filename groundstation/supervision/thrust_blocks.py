@@ -91,6 +91,8 @@ class ThrustBlocks:
         lags_s: Of the accelerometers' and of the gyro's low-pass.
         block_s: Length of a block.
         sag: Factor of thrust per further open valve.
+        step_s: Longest step of the lags. A sample's window may be longer than a pulse, whose two edges one
+            step would take for a part of one.
     """
 
     def __init__(
@@ -101,8 +103,9 @@ class ThrustBlocks:
         lags_s: tuple[float, float],
         block_s: float,
         sag: float = 1.0,
+        step_s: float = math.inf,
     ) -> None:
-        self._sag = sag
+        self._sag, self._step_s = sag, step_s
         self._model, self._delays_s, self._block_s = model, delays_s, block_s
         self._count = len(model.valves)
         self._rise_s, (self._acc_lag_s, self._gyro_lag_s) = rise_s, lags_s
@@ -152,6 +155,15 @@ class ThrustBlocks:
 
     def _respond(self, start_ns: int, stop_ns: int, sums: _Sums | None) -> None:
         """Let the lags follow the commands over a span; add what sensors feel to the sums."""
+        steps = 1 if sums is None else math.ceil((stop_ns - start_ns) * 1e-9 / self._step_s - 1e-6) or 1
+        began_s = 0.0 if sums is None else sums.span_s - (stop_ns - start_ns) * 1e-9
+        for step in range(steps):
+            from_ns = start_ns + (stop_ns - start_ns) * step // steps
+            to_ns = start_ns + (stop_ns - start_ns) * (step + 1) // steps
+            self._step(from_ns, to_ns, sums, began_s + 0.5e-9 * (from_ns + to_ns - 2 * start_ns))
+
+    def _step(self, start_ns: int, stop_ns: int, sums: _Sums | None, middle_s: float) -> None:
+        """One step of the lags; its middle counts from the block's start."""
         targets: dict[int, float] = {}
         for valve, share in self._push.open_shares(start_ns, stop_ns):
             targets[valve] = targets.get(valve, 0.0) + share
@@ -170,7 +182,7 @@ class ThrustBlocks:
                 sums.open_shares[valve] += span_s * felt
                 sums.rate_shares[valve] += span_s * turned
                 sums.edges[valve] += abs(change)
-                sums.moments[valve] += span_s * turned * (sums.span_s - 0.5 * span_s)
+                sums.moments[valve] += span_s * turned * middle_s
                 felt_all.append((valve, felt))
                 if change < 0.0:
                     sums.ends[valve] -= change

@@ -18,6 +18,7 @@ class IdentificationConfig:
         open_delay_s, close_delay_s, rise_s, sag: Of the rig.
         acc_lag_s, gyro_lag_s: Of the sensors' low-pass.
         block_s: Length of a block.
+        step_s: Longest step in which pulses are laid beside samples.
         thrust_sigma: Of each valve's thrust over mass, and torque over inertia, over the rig's.
         delay_sigma_s: Of each valve's opening and closing delay.
         shift_sigma_s: By which all of them are late together, stamps included.
@@ -40,6 +41,7 @@ class IdentificationConfig:
     acc_lag_s: float = 0.0
     gyro_lag_s: float = 0.0
     block_s: float = 0.02
+    step_s: float = 0.002
     thrust_sigma: float = 0.15
     delay_sigma_s: float = 0.001
     shift_sigma_s: float = 0.001

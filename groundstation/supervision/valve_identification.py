@@ -45,7 +45,9 @@ class ValveIdentification:
         self._count = n = len(model.valves)
         delays_s = (config.open_delay_s, config.close_delay_s)
         lags_s = (config.acc_lag_s, config.gyro_lag_s)
-        self._blocks = ThrustBlocks(model, delays_s, config.rise_s, lags_s, config.block_s, config.sag)
+        self._blocks = ThrustBlocks(
+            model, delays_s, config.rise_s, lags_s, config.block_s, config.sag, config.step_s
+        )
         columns = model.effectiveness()
         self._push = columns[:2] / model.mass_kg
         self._turn = columns[2] / model.inertia_kg_m2

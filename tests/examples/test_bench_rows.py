@@ -1,10 +1,12 @@
 """The parts of ``make bench`` that can be wrong without anybody seeing it in the table."""
 
+import importlib
 import json
 from pathlib import Path
 
 import pytest
 
+from groundstation.campaign.plan import Plan, columns_of
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.recording.info import RecordingInfo
@@ -12,6 +14,7 @@ from groundstation.recording.reader import Recording
 from groundstation.recording.writer import Recorder
 from groundstation.rig.read import load_rig
 from groundstation.runners.make_runner import make_runner
+from groundstation.scenario.loading import load
 
 ROOT = Path(__file__).parents[2]
 
@@ -73,3 +76,48 @@ def test_healthy_flights_that_were_not_flown_show_nothing(
     *promises, healthy = module.measure(None)
     assert all(promise.ok is None for promise in promises)
     assert (healthy.measured, healthy.ok) == (shown, ok)
+
+
+def test_every_figure_of_formation_flight_is_a_column_of_its_scenario(bench):
+    figures = bench("flying_formation").figures()
+    subjects = importlib.import_module("formation_flights").SUBJECTS
+    assert {figure.subject for figure in figures} <= set(subjects)
+    for figure in figures:
+        fly = subjects[figure.subject].fly
+        if figure.subject == "silence":
+            continue
+        (path,) = fly.args
+        columns = columns_of(load(path), Plan(1, 1))
+        assert set(figure.names) <= set(columns), (figure.what, columns)
+
+
+def test_bounds_of_formation_flight_are_those_of_their_tasks(bench):
+    rows = bench("flying_formation")
+    assert rows.bang_bang_s() == pytest.approx(10.08, abs=0.02)
+    assert rows.least_impulse_n_s() == pytest.approx(1.26, abs=0.01)
+    assert rows.least_holding_n_s() == pytest.approx(11.0 * 9.80665 * 5e-4 * 90.0)
+
+
+def test_a_figure_is_that_of_95_of_100_flights_and_a_missing_one_is_the_worst(bench):
+    rows = bench("flying_formation")
+    figure = rows.Figure("way", "swap", ("a", "b"), "mm", 10.0, 5.0)
+    flights = [{"verdict": "passed", "figures": {"a": 1.0, "b": float(k)}} for k in range(100)]
+    row = rows.figure_row(figure, flights)
+    assert row.measured.startswith("95 mm (median 49.5, worst 99 of 100)")
+    assert row.ok is False
+    assert rows.figure_row(figure, flights[:8]).ok is True
+    assert rows.figure_row(figure, [{"figures": {"a": 1.0}}]).ok is False
+    assert rows.figure_row(figure, []).ok is False
+    least = rows.Figure("gap", "swap", ("a", "b"), "mm", 50.0, 80.0, is_least=True)
+    assert rows.figure_row(least, [{"figures": {"a": 90.0, "b": 60.0}}]).measured.startswith("60 mm")
+    assert rows.figure_row(least, [{"figures": {"a": 90.0, "b": 40.0}}]).ok is False
+
+
+def test_success_in_too_few_flights_shows_nothing(bench):
+    rows = bench("flying_formation")
+    success = rows.Success("docks", "dock_still", 97, 100)
+    flights = [{"verdict": "passed"}] * 97 + [{"verdict": "failed"}] * 3
+    assert rows.success_row(success, flights).ok is True
+    assert rows.success_row(success, [*flights[1:], {"verdict": "failed"}]).ok is False
+    assert rows.success_row(success, flights[:20]).ok is None
+    assert rows.success_row(success, []).ok is False

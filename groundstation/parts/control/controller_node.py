@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from groundstation.control.averaging import RateMean
-from groundstation.control.controller import Controller
+from groundstation.control.controller import Controller, KeepsPlaces
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
 from groundstation.control.surroundings import Obstacle
@@ -18,12 +18,16 @@ from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
+from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 from groundstation.supervision.apart import Others
+from groundstation.supervision.modes import GROUNDED, Mode
 
 STALE_NS = 300_000_000
 RESUME = "resume"
 STATUS_EVERY = 2
+DOWN = frozenset((*GROUNDED, Mode.LANDING))
+"""Modes of a mock-up that has fallen out of a formation: its supervisor has cut its air."""
 
 
 class ControllerNode(Node):
@@ -45,7 +49,16 @@ class ControllerNode(Node):
         table_map: What pulls where on the table, fed forward; None where nobody knows.
     """
 
-    inputs = (VehicleState, ControlStatus, FusionStatus, ValveDemand, ValveCommand, Request, Lease)
+    inputs = (
+        VehicleState,
+        ControlStatus,
+        FusionStatus,
+        ValveDemand,
+        ValveCommand,
+        Supervision,
+        Request,
+        Lease,
+    )
     outputs = (Wrench, ControlStatus, Ack)
     trigger = VehicleState
 
@@ -76,6 +89,7 @@ class ControllerNode(Node):
         self._others = Others(obstacles=obstacles)
         self._lease = LeaseCheck()
         self._states: dict[str, tuple[int, ControlState]] = {}
+        self._down: set[str] = set()
         self._own_rate = RateMean()
         self._map = table_map
         self._slope_left_m_s2 = (0.0, 0.0)
@@ -86,6 +100,9 @@ class ControllerNode(Node):
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
         if payload is VehicleState:
             return self._vehicles
+        if payload is Supervision:
+            cares = isinstance(self._program, KeepsPlaces)
+            return tuple(name for name in self._vehicles[1:] if cares and name in self._followed)
         return self._vehicles[1:] if payload is ControlStatus else (self.vehicle,)
 
     def takes_paced(self, payload: type[Message], source: str) -> bool:
@@ -97,6 +114,8 @@ class ControllerNode(Node):
                 self._receive_state(message)
             case ControlStatus():
                 self._others.goals_table_m[message.vehicle] = message.goal_position_table_m
+            case Supervision():
+                (self._down.add if message.mode in DOWN else self._down.discard)(message.vehicle)
             case FusionStatus():
                 self._slope_left_m_s2 = message.slope_left_m_s2
             case ValveDemand():
@@ -123,6 +142,9 @@ class ControllerNode(Node):
         state = self._own_rate.take()
         if state is None or fresh.pop(self.vehicle, None) is None:
             return
+        if isinstance(self._law, KeepsPlaces):
+            seen_m = self._others.positions_table_m
+            self._law.see_fallen({name: seen_m[name] for name in self._down if name in seen_m})
         wrench = self._law.update(
             self._with_slope(state),
             self._goal,

@@ -1,6 +1,5 @@
 """Part ``control``: the state becomes the wrench that the vehicle's controller wants."""
 
-import itertools
 import math
 from typing import Any
 
@@ -15,6 +14,7 @@ from groundstation.declarations.rig import Rig
 from groundstation.declarations.validation import message_of
 from groundstation.parts.control.actions import GO_TO
 from groundstation.parts.control.controller_node import ControllerNode
+from groundstation.parts.control.fleet_check import check_corridors, check_holds, check_leaders
 from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import (
@@ -22,9 +22,7 @@ from groundstation.parts.control.sections import (
     ControlOfVehicle,
     config_of,
     control_of,
-    neighbours_of,
 )
-from groundstation.supervision.apart import in_the_way, too_near
 
 HOLDING = "go_to"
 """The controller that flies where a program is interrupted."""
@@ -95,21 +93,9 @@ def _check(rig: Rig) -> None:
         except ValueError as error:
             raise ValueError(f"{key}.parameters: {error}") from error
 
-    _check_holds(rig)
-
-
-def _check_holds(rig: Rig) -> None:
-    """Poses that are held at the same time are apart; who follows others is told by them where to go."""
-    held = {name: rig.vehicles[name].hold for name in rig.vehicles if not neighbours_of(rig, name)}
-    for name, hold in held.items():
-        refusal = in_the_way((hold.x_m, hold.y_m), rig.table.obstacles())
-        if refusal:
-            raise ValueError(f"vehicles.{name}.hold: {refusal}")
-    for (name, hold), (other, its) in itertools.combinations(held.items(), 2):
-        apart_m = math.dist((hold.x_m, hold.y_m), (its.x_m, its.y_m))
-        refusal = too_near(f"the hold pose of {name}", apart_m, relation="from there")
-        if refusal:
-            raise ValueError(f"vehicles.{other}.hold: {refusal}")
+    check_leaders(rig)
+    check_holds(rig)
+    check_corridors(rig)
 
 
 def _check_name(controller: str, key: str) -> None:

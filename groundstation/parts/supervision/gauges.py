@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack
 from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
+from groundstation.parts.supervision.learned import LearnedGauge
 from groundstation.parts.supervision.messages import Faults, Supervision
 
 _LEVELS = {
@@ -108,4 +109,4 @@ class FaultGauge(Gauge):
         return f"{f'FAULTS {count}' if count else 'no faults':<9}"
 
 
-GAUGES = (GaugeRow(1, ModeGauge), GaugeRow(2, FaultGauge))
+GAUGES = (GaugeRow(1, ModeGauge), GaugeRow(2, FaultGauge), GaugeRow(125, LearnedGauge))

@@ -123,6 +123,37 @@ class ValveShares(Message):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ValvesLearned(Message):
+    """What flying has told of each valve by now; NaN where it has told nothing yet; latched.
+
+    Only thrust over mass and torque over inertia can be seen in motion, so a mass that is wrong looks like
+    valves that all are; and only the time between the shifts of opening and closing, for a common shift looks
+    like stamps that are late.
+
+    Attributes:
+        thrust_over_mass_ratio: Over the rig's.
+        thrust_over_mass_sigma: Its standard deviation.
+        torque_over_inertia_ratio: Over the rig's.
+        torque_over_inertia_sigma: Its standard deviation.
+        dead_time_s: Opening less closing delay: by so much a pulse pushes shorter than it is commanded.
+        dead_time_sigma_s: Its standard deviation.
+        open_s: How long it was open while it was learned from.
+        set_aside: Blocks that something pushed in which is no valve.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ValvesLearned"
+    TOPIC: ClassVar = Topic("valves_learned", 1, Rank.ESTIMATE, latched=True)
+    thrust_over_mass_ratio: Float64Sequence
+    thrust_over_mass_sigma: Float64Sequence
+    torque_over_inertia_ratio: Float64Sequence
+    torque_over_inertia_sigma: Float64Sequence
+    dead_time_s: Float64Sequence
+    dead_time_sigma_s: Float64Sequence
+    open_s: Float64Sequence
+    set_aside: U32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Faults(Message):
     """Every fault that a vehicle has, until it clears; latched. Published when one begins or ends.
 

@@ -16,6 +16,7 @@ from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
 from groundstation.parts.supervision.figures import SupervisionFigure
 from groundstation.parts.supervision.gauges import GAUGES
+from groundstation.parts.supervision.learned import LearnedFigure
 from groundstation.parts.supervision.memory import MemoryPort
 from groundstation.parts.supervision.messages import (
     Faults,
@@ -24,18 +25,24 @@ from groundstation.parts.supervision.messages import (
     StopPress,
     Supervision,
     ValveShares,
+    ValvesLearned,
 )
-from groundstation.parts.supervision.sections import SupervisionOfVehicle
+from groundstation.parts.supervision.sections import SupervisionOfType, SupervisionOfVehicle
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
+from groundstation.parts.supervision.valve_learner import ValveLearner
 from groundstation.supervision.imu_consistency import ImuConsistency, ImuConsistencyConfig
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
 from groundstation.supervision.thrust_fit import FitConfig
 from groundstation.supervision.valve_consistency import ValveConsistency, ValveConsistencyConfig
+from groundstation.supervision.valve_estimate import IdentificationConfig
+from groundstation.supervision.valve_identification import ValveIdentification
 
 NODE_FRAMES_HZ, SPARE_FRAMES_HZ = 60.0, 100.0
 """What a valve node sends a second, and what others may send besides."""
 HEADING_SIGMA_RAD = 0.002  # of fixes that are no camera's
+EDGES_SIGMA_S = 2e-4
+"""Of a dead time, however long is learned: samples of 10 ms blur edges, and sag is shared among valves."""
 
 
 def _supervisor(rig: Rig, vehicle: str) -> Node:
@@ -97,6 +104,26 @@ def _detector(rig: Rig, vehicle: str) -> Node:
     )
 
 
+def _learner(rig: Rig, vehicle: str) -> Node:
+    type_, imu = rig.type_of(vehicle), rig.of_type(vehicle, ImuOfType).imu
+    known = IdentificationConfig(
+        imu_position_body_m=imu.position_body_m,
+        gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
+        acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
+        open_delay_s=type_.valves.open_delay_s,
+        close_delay_s=type_.valves.close_delay_s,
+        rise_s=type_.valves.rise_s,
+        acc_lag_s=lag_of_bandwidth(imu.acc_bandwidth_hz),
+        gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
+        model_sigma_s=EDGES_SIGMA_S,
+    )
+    return ValveLearner(vehicle, ValveIdentification(type_.model(), known))
+
+
+def _learns(rig: Rig, vehicle: str) -> bool:
+    return rig.of_type(vehicle, SupervisionOfType).learns_valves
+
+
 def _memory(rig: Rig, vehicle: str) -> Port:
     del rig
     return MemoryPort(f"{vehicle}/memory", vehicle, f"{STATION_CHANNEL}memory")
@@ -105,14 +132,16 @@ def _memory(rig: Rig, vehicle: str) -> Port:
 PART = Part(
     name="supervision",
     summary="modes, stop, faults and the arming gate of each vehicle",
-    topics=(Recalled, StopPress, Supervision, Faults, Findings, ValveShares),
+    topics=(Recalled, StopPress, Supervision, Faults, Findings, ValveShares, ValvesLearned),
     nodes=(
         NodeRow("supervisor", COMMANDS, Weight.URGENT, SupervisorNode, _supervisor),
         NodeRow("fault_detector", FLIGHT, Weight.LIGHT, FaultDetector, _detector),
+        NodeRow("valve_learner", FLIGHT, Weight.LIGHT, ValveLearner, _learner, _learns),
     ),
     ports=(PortRow("supervisor", MemoryPort, _memory),),
     actions=tuple(ACTIONS.values()),
+    mock_up=SupervisionOfType,
     vehicle=SupervisionOfVehicle,
     gauges=GAUGES,
-    figures=(SupervisionFigure,),
+    figures=(SupervisionFigure, LearnedFigure),
 )

@@ -3,15 +3,10 @@
 from collections.abc import Iterator
 
 from groundstation.control.braking import Braking
-from groundstation.control.corridor import Docking, may_touch
-from groundstation.control.edge import braking_to_count_on, edge_outlook
 from groundstation.control.modulation import PulseModulator
 from groundstation.control.mux import CommandMux, Selection, Source
-from groundstation.control.safety_filter import TURN_RATE, Disc, SafetyFilter, body_force, table_acceleration
-from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Vector2, clamp
-from groundstation.control.surroundings import Surroundings
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState
 from groundstation.control.valve_health import health_of
-from groundstation.control.vehicle import VehicleModel
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
@@ -24,7 +19,7 @@ from groundstation.parts.valves.actions import PUSH
 from groundstation.parts.valves.hand_push import HandPush
 from groundstation.parts.valves.messages import Outlook, OutsideControl, ValveDemand, ValveSelection
 from groundstation.parts.valves.outside_pilot import OutsidePilot
-from groundstation.supervision.clearance import clearance
+from groundstation.parts.valves.safe_wish import SafeWish
 from groundstation.supervision.modes import Law
 
 PERIOD_NS = 20_000_000
@@ -44,11 +39,8 @@ class CommandMuxNode(Node):
         others: The other vehicles.
         choice: Who may command.
         braking: The brake law.
-        safety: The filter behind every source but the brake.
-        surroundings: Obstacles, and where the others are.
-        model: Mass properties.
+        safety: What stands behind every source but the brake.
         modulator: Makes pulses.
-        dockings: Pairs that may touch, each inside its corridor.
     """
 
     inputs = (Wrench, OutsideWrench, VehicleState, Supervision, ValveShares, Request, Lease)
@@ -62,19 +54,13 @@ class CommandMuxNode(Node):
         others: tuple[str, ...],
         choice: CommandMux[BodyWrench],
         braking: Braking,
-        safety: SafetyFilter,
-        surroundings: Surroundings,
-        model: VehicleModel,
+        safety: SafeWish,
         modulator: PulseModulator,
-        dockings: tuple[Docking, ...] = (),
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
         self._others = others
         self._choice, self._braking, self._safety = choice, braking, safety
-        self._surroundings = surroundings
-        self._model = model
         self._modulator = modulator
-        self._dockings = dockings
         self._period_ns = round(modulator.config.period_s * 1e9)
         self._due_ns: int  # since the source changed, from none to closed at first
         self._hand = HandPush(self._period_ns)
@@ -82,11 +68,9 @@ class CommandMuxNode(Node):
         self._ruling: Supervision | None = None
         self._ruling_ns: int  # of the ruling
         self._lease = LeaseCheck()
-        self._sigma_m: tuple[float, float]  # of the state that braking has
         self._counter = self._pulse_id = self._ticks = 0
         self._on_time_ms = CLOSED
         self._source: Source | None = None
-        self._limited_by = ""
 
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
         return (self.vehicle, *self._others) if payload is VehicleState else (self.vehicle,)
@@ -140,9 +124,9 @@ class CommandMuxNode(Node):
         is_flown = message.status == "flying"
         sigma_m = message.pose_sigma[:2]
         if message.vehicle != self.vehicle:
-            self._surroundings.see(message.vehicle, state, sigma_m, now_ns, is_flown=is_flown)
+            self._safety.surroundings.see(message.vehicle, state, sigma_m, now_ns, is_flown=is_flown)
         elif is_flown:
-            self._sigma_m = sigma_m
+            self._safety.own_sigma_m = sigma_m
             self._braking.take(state, now_ns)
             self._choice.receive_state(now_ns)
 
@@ -177,7 +161,7 @@ class CommandMuxNode(Node):
         if changed:  # what another source was owed is of no use to this one
             self._modulator.reset()
             self._due_ns = now_ns
-            self._limited_by = ""
+            self._safety.limited_by = ""
             self._braking.begin()
         if selection.source is Source.CLOSED:
             if changed:
@@ -185,7 +169,7 @@ class CommandMuxNode(Node):
         elif selection.source is Source.BRAKE:
             if now_ns >= self._due_ns:
                 self._due_ns += self._period_ns
-                yield from self._make(self._braking.wrench(now_ns, self._resting_place), now_ns)
+                yield from self._make(self._braking.wrench(now_ns, self._safety.resting_place), now_ns)
         elif selection.is_new or changed:
             yield from self._make(selection.demand, now_ns)
         self._counter = (self._counter + 1) % 16
@@ -204,7 +188,7 @@ class CommandMuxNode(Node):
         if wanted is None:
             return
         is_brake = self._source is Source.BRAKE and self._braking.held is None
-        safe = wanted if is_brake else self._filtered(wanted, now_ns)
+        safe = wanted if is_brake else self._safety.filtered(wanted, now_ns)
         pulses = self._modulator.update(safe)
         self._braking.deliver(pulses.delivered)
         self._pulse(bytes(pulses.on_time_ms))
@@ -215,57 +199,13 @@ class CommandMuxNode(Node):
             str(self._source),
             wanted.force_body_n,
             wanted.torque_nm,
-            self._limited_by,
+            self._safety.limited_by,
             pulses.delivered.force_body_n,
             pulses.delivered.torque_nm,
         )
 
-    def _filtered(self, wanted: BodyWrench, now_ns: int) -> BodyWrench:
-        state, envelope = self._braking.state, self._braking.envelope
-        if state is None:
-            self._limited_by = "no state"
-            return NO_WRENCH
-        makeable = envelope.saturate(wanted)
-        found = self._safety.filtered(
-            table_acceleration(makeable, state.heading_rad, self._model.mass_kg),
-            state,
-            self._discs(now_ns),
-            braking_to_count_on(self._model, envelope),
-        )
-        inertia = self._model.inertia_kg_m2
-        torque = inertia * self._safety.turned(makeable.torque_nm / inertia, state.rate_rad_s)
-        spins = () if torque == makeable.torque_nm else (TURN_RATE,)
-        self._limited_by = ", ".join(found.limited_by + spins)
-        if found.must_brake:
-            return self._braking.wrench(now_ns) or NO_WRENCH
-        if not found.limited_by:
-            return BodyWrench(makeable.force_body_n, torque) if spins else wanted
-        force = body_force(found.acceleration_table_m_s2, state.heading_rad, self._model.mass_kg)
-        torque = clamp(torque, self._safety.config.torque_share * envelope.max_torque_nm)
-        return envelope.saturate(BodyWrench(force, torque))
-
-    def _resting_place(self, position_table_m: Vector2, now_ns: int) -> Vector2:
-        return self._safety.resting_place(position_table_m, self._discs(now_ns))
-
-    def _discs(self, now_ns: int) -> list[Disc]:
-        own = self._braking.state
-        exempt = frozenset[str]()
-        if own is not None and self._dockings:
-            states = {**self._surroundings.others(now_ns), self.vehicle: own}
-            exempt = may_touch(self.vehicle, self._dockings, states)
-        return self._surroundings.discs(self._sigma_m, now_ns, exempt)
-
     def _look_ahead(self, state: ControlState, now_ns: int) -> Outlook:
-        braking_m_s2 = braking_to_count_on(self._model, self._braking.envelope)
-        reaction_s = self._safety.config.reaction_s
-        edge = edge_outlook(state, self._safety.keep_in, braking_m_s2, reaction_s=reaction_s)
-        nearest = clearance(
-            state,
-            self._surroundings.others(now_ns),
-            max(braking_m_s2, 1e-6),
-            reaction_s=reaction_s,
-            radius_m=self._surroundings.radius_m,
-        )
+        edge, nearest = self._safety.outlook(state, now_ns)
         return Outlook(
             now_ns,
             self.vehicle,
@@ -274,7 +214,7 @@ class CommandMuxNode(Node):
             edge.room_m,
             nearest.name,
             nearest.room_m,
-            self._limited_by,
+            self._safety.limited_by,
         )
 
     def _pulse(self, on_time_ms: bytes) -> None:

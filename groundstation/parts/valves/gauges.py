@@ -167,5 +167,5 @@ GAUGES = (
     GaugeRow(20, GateGauge),
     GaugeRow(30, SourceGauge),
     GaugeRow(35, OutlookGauge),
-    GaugeRow(130, TankGauge),
+    GaugeRow(36, TankGauge),
 )

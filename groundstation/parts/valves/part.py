@@ -30,6 +30,7 @@ from groundstation.parts.valves.messages import (
     ValveStatus,
 )
 from groundstation.parts.valves.port import ValveBus
+from groundstation.parts.valves.safe_wish import SafeWish
 from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
 from groundstation.parts.valves.valve_writer import ValveWriter
 
@@ -49,17 +50,17 @@ def _command_mux(rig: Rig, vehicle: str) -> Node:
     type_ = rig.type_of(vehicle)
     model, modulator = type_.model(), _modulator(type_)
     period_ns = round(modulator.config.period_s * 1e9)
-    return CommandMuxNode(
+    braking = Braking(BrakeConfig(), model, modulator.envelope, period_ns)
+    safety = SafeWish(
         vehicle,
-        tuple(name for name in rig.vehicles if name != vehicle),
-        CommandMux(MuxConfig()),
-        Braking(BrakeConfig(), model, modulator.envelope, period_ns),
+        braking,
         SafetyFilter(SafetyFilterConfig(), rig.table.keep_in()),
         Surroundings(MOCK_UP_RADIUS_M, rig.table.obstacles()),
         model,
-        modulator,
         dockings_of(rig),
     )
+    others = tuple(name for name in rig.vehicles if name != vehicle)
+    return CommandMuxNode(vehicle, others, CommandMux(MuxConfig()), braking, safety, modulator)
 
 
 def _guard(rig: Rig, vehicle: str) -> Node:

@@ -64,6 +64,10 @@ def test_mode_and_faults_of_both_come_before_anything_else():
     assert "\N{HORIZONTAL ELLIPSIS}" in lines[mode]
 
 
+def test_gas_left_is_on_it():
+    assert any(line.strip().startswith("tank") for line in screen_of(("alpha", "beta")))
+
+
 def test_the_newest_event_and_the_keys_are_on_it():
     lines = screen_of(("alpha", "beta"))
     assert any("event 11" in line for line in lines)

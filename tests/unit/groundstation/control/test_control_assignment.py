@@ -79,11 +79,17 @@ def test_a_place_that_falls_empty_is_kept_by_rule():
 
 
 def test_a_place_that_falls_empty_is_filled_by_rule_and_the_last_one_falls_empty():
-    filled = reassigned(STOOD, ["beta"], LINE, "fill", is_blocked=False)
+    filled = reassigned(STOOD, ["beta"], LINE, "fill")
     assert filled == {"alpha": 0, "gamma": 1, "delta": 2}
 
 
 def test_nobody_is_sent_to_where_the_fallen_one_stands():
-    assert reassigned(STOOD, ["beta"], LINE, "fill") == {"alpha": 0, "gamma": 2, "delta": 3}
+    assert reassigned(STOOD, ["beta"], LINE, "fill", blocked=[1]) == {"alpha": 0, "gamma": 2, "delta": 3}
     spare = [*LINE, (2.4, 0.0)]
-    assert reassigned(STOOD | {"delta": 4}, ["beta"], spare, "fill") == {"alpha": 0, "gamma": 2, "delta": 3}
+    moved = reassigned(STOOD | {"delta": 4}, ["beta"], spare, "fill", blocked=[1])
+    assert moved == {"alpha": 0, "gamma": 2, "delta": 3}
+
+
+def test_who_is_at_a_place_that_is_blocked_stays_and_without_free_places_all_do():
+    assert reassigned(STOOD, ["beta"], LINE, "fill", blocked=[0, 1]) == {"alpha": 0, "gamma": 2, "delta": 3}
+    assert reassigned({"alpha": 1, "beta": 0}, ["beta"], LINE[:2], "fill", blocked=[0]) == {"alpha": 1}

@@ -147,3 +147,78 @@ def test_who_is_armed_anew_at_its_place_stays_there(table):
 def test_what_cannot_be_flown_is_refused_in_a_sentence(parameters, words):
     with pytest.raises(ValueError, match=words):
         law(**{"ship": "alpha", **parameters})
+
+
+ROW = ((0.0, -0.6), (-0.8, -0.2), (0.8, 0.0), (-0.2, 0.6))
+STAND = {"alpha": (0.0, -0.6), "beta": (-0.8, -0.2), "gamma": (0.8, 0.0)}
+
+
+@pytest.fixture
+def row():
+    """Makes three ships that stand in a row, by a rule for places that fall empty."""
+
+    def make(rule):
+        laws = {name: law(name, starts_m=STAND, places_m=ROW, empty=rule) for name in STAND}
+        table = Table(laws, STAND)
+        table.fly(5.0)
+        return table
+
+    return make
+
+
+def fallen(table, name, place_m):
+    """A ship comes down somewhere: it is not seen by its state any more, its supervisor says so."""
+    table.hidden = {name}
+    table.held = {name}
+    table.states[name] = ControlState(place_m, (0.0, 0.0), 0.0, 0.0)
+    for other, each in table.laws.items():
+        if other != name:
+            each.see_fallen({name: place_m})
+
+
+def test_the_place_of_who_came_down_elsewhere_is_filled_by_rule(row):
+    table = row("fill")
+    fallen(table, "alpha", (-1.4, -0.9))
+    table.fly(40.0)
+    # gamma's way to it is 1.0 m; beta's is shorter, but then gamma would have to take beta's place
+    assert table.place("gamma") == pytest.approx(ROW[0], abs=0.005)
+    assert table.place("beta") == pytest.approx(ROW[1], abs=0.005)
+    assert table.least_m > 0.4 + 0.10
+
+
+@pytest.mark.parametrize(("rule", "lies_m"), [("keep", (-1.4, -0.9)), ("fill", (0.03, -0.58))])
+def test_a_place_stays_empty_by_rule_and_where_the_fallen_one_lies_in_it(row, rule, lies_m):
+    table = row(rule)
+    fallen(table, "alpha", lies_m)
+    table.fly(30.0)
+    assert table.place("beta") == pytest.approx(ROW[1], abs=0.005)
+    assert table.place("gamma") == pytest.approx(ROW[2], abs=0.005)
+
+
+def test_one_that_comes_down_beside_all_ways_is_not_waited_for(table):
+    table.fly(12.0)
+    fallen(table, "gamma", (-1.7, 1.2))
+    table.fly(60.0)
+    for name in ("alpha", "beta"):
+        assert math.dist(table.place(name), PLACES[list(STARTS).index(name)]) < 0.005
+
+
+def test_one_that_comes_down_on_a_way_stops_the_others(table):
+    table.fly(12.0)
+    on_way_m = tuple(table.laws["alpha"].plan.at(20.0)[0][0].tolist())
+    fallen(table, "gamma", on_way_m)
+    table.fly(30.0)
+    for name in ("alpha", "beta"):
+        assert math.hypot(*table.states[name].velocity_table_m_s) < 0.003
+        assert math.dist(table.place(name), PLACES[list(STARTS).index(name)]) > 0.2
+
+
+def test_a_second_one_that_comes_down_is_answered_too(row):
+    table = row("fill")
+    fallen(table, "alpha", (0.0, -0.6))  # in its place: nobody moves
+    table.fly(6.0)
+    table.hidden |= {"beta"}
+    table.held |= {"beta"}
+    table.laws["gamma"].see_fallen({"alpha": (0.0, -0.6), "beta": (-1.6, 1.1)})
+    table.fly(40.0)
+    assert table.place("gamma") == pytest.approx(ROW[1], abs=0.005)

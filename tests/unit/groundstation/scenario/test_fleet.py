@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.control.controllers import controllers
-from groundstation.control.trajectory import TrajectoryConfig
+from groundstation.control.trajectory_config import TrajectoryConfig
 from groundstation.parts.control.sections import config_of, control_of, dockings_of, neighbours_of
 from groundstation.scenario.compiling import groups_of
 from groundstation.scenario.limits import expanded
@@ -86,3 +86,91 @@ def test_a_target_that_is_no_other_vehicle_is_refused(tmp_path, target):
     path.write_text(text.replace("../rigs", (SCENARIOS.parent / "rigs").as_posix()))
     with pytest.raises(ScenarioError, match=f"'{target}' is no other vehicle of the rig"):
         load(path)
+
+
+FLEET = """
+name = "who leads"
+rig = "{rig}"
+duration_s = 10.0
+"""
+RIG = (SCENARIOS.parent / "rigs" / "five_mock_ups.toml").as_posix()
+FOLLOWS = """
+[vehicles.{name}.control]
+controller = "follow"
+parameters = {{ leader = "{leader}", distance_m = 0.8 }}
+"""
+
+
+def fleet_of(tmp_path, text):
+    path = tmp_path / "fleet.toml"
+    path.write_text(FLEET.format(rig=RIG) + text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("leaders", "circle"),
+    [
+        ({"alpha": "beta", "beta": "alpha"}, "alpha follows beta, beta follows alpha: nobody leads"),
+        (
+            {"alpha": "beta", "beta": "gamma", "gamma": "alpha"},
+            "alpha follows beta, beta follows gamma, gamma follows alpha: nobody leads",
+        ),
+        (
+            {"alpha": "beta", "beta": "gamma", "gamma": "delta", "delta": "epsilon", "epsilon": "beta"},
+            "beta follows gamma, gamma follows delta, delta follows epsilon, epsilon follows beta: nobody",
+        ),
+    ],
+)
+def test_who_follows_its_follower_is_refused_with_file_and_key(tmp_path, leaders, circle):
+    text = "".join(FOLLOWS.format(name=name, leader=leader) for name, leader in leaders.items())
+    path = fleet_of(tmp_path, text)
+    with pytest.raises(ScenarioError) as raised:
+        load(path)
+    said = str(raised.value)
+    assert said.startswith(str(path))
+    assert f".control.parameters: {circle}" in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize("leader", ["beta", "omega"])
+def test_a_leader_that_is_no_other_vehicle_is_refused_with_file_and_key(tmp_path, leader):
+    path = fleet_of(tmp_path, FOLLOWS.format(name="beta", leader=leader))
+    with pytest.raises(ScenarioError) as raised:
+        load(path)
+    said = str(raised.value)
+    assert said.startswith(str(path))
+    assert f"vehicles.beta.control.parameters: '{leader}' is no other vehicle of the rig" in said
+
+
+def test_a_chain_and_a_circle_of_formations_that_one_leads_are_right(tmp_path):
+    chain = {"beta": "alpha", "gamma": "beta", "delta": "gamma", "epsilon": "delta"}
+    load(fleet_of(tmp_path, "".join(FOLLOWS.format(name=name, leader=each) for name, each in chain.items())))
+    mutual = """
+[vehicles.alpha.control]
+controller = "formation"
+parameters = { neighbours = { beta = { offset_m = [-0.8, 0.0] } } WEIGHT }
+[vehicles.beta.control]
+controller = "formation"
+parameters = { neighbours = { alpha = { offset_m = [0.8, 0.0] } } }
+"""
+    load(fleet_of(tmp_path, mutual.replace("WEIGHT", ", goal_weight = 1.0")))
+    with pytest.raises(ScenarioError, match="nobody leads"):
+        load(fleet_of(tmp_path, mutual.replace("WEIGHT", "")))
+
+
+def test_a_corridor_that_leads_over_the_edge_is_refused_with_file_and_key(tmp_path):
+    text = (
+        (SCENARIOS / "dock_still.toml").read_text().replace("../rigs", (SCENARIOS.parent / "rigs").as_posix())
+    )
+    path = tmp_path / "dock.toml"
+    start = next(line for line in text.splitlines() if line.startswith("start") and "0.2" in line)
+    path.write_text(text.replace(start, "start = { x_m = 1.6, y_m = 0.1, heading_deg = -90.0 }"))
+    with pytest.raises(ScenarioError) as raised:
+        load(path)
+    said = str(raised.value)
+    assert said.startswith(str(path))
+    assert (
+        "vehicles.beta.control.parameters.axis_deg: the gate of the corridor to alpha would lie at (2."
+        in said
+    )
+    assert "outside the part of the table" in said

@@ -20,6 +20,7 @@ from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.command_mux_node import CommandMuxNode
 from groundstation.parts.valves.messages import ValveSelection
+from groundstation.parts.valves.safe_wish import SafeWish
 
 MS = 1_000_000
 MODEL = VehicleModel(11.0, 0.25, square_of_eight())
@@ -32,16 +33,10 @@ def modulator():
 @cache
 def made():
     pulses = modulator()
-    return CommandMuxNode(
-        "alpha",
-        ("beta",),
-        CommandMux(MuxConfig()),
-        Braking(BrakeConfig(), MODEL, pulses.envelope, 100 * MS),
-        SafetyFilter(SafetyFilterConfig(), rectangle((4.0, 3.0), margin_m=0.2)),
-        Surroundings(0.2),
-        MODEL,
-        pulses,
-    )
+    braking = Braking(BrakeConfig(), MODEL, pulses.envelope, 100 * MS)
+    filtering = SafetyFilter(SafetyFilterConfig(), rectangle((4.0, 3.0), margin_m=0.2))
+    safety = SafeWish("alpha", braking, filtering, Surroundings(0.2), MODEL)
+    return CommandMuxNode("alpha", ("beta",), CommandMux(MuxConfig()), braking, safety, pulses)
 
 
 def ruling(law, mode=None, cause="the cause"):
