@@ -1,6 +1,6 @@
 """Each row of the table of faults is brought about in closed loop by a test that says so.
 
-A test says it by ``@pytest.mark.provokes("row")``; a new row without one and a mark without its row fail here.
+A test says it by ``@pytest.mark.provokes("row")``; a new row without one, or a mark without its row, fails.
 """
 
 import ast

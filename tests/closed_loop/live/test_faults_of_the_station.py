@@ -1,4 +1,4 @@
-"""What goes wrong with the station in flight is named: processes that starve or hang, a memory that is full."""
+"""What goes wrong with the station in flight is named: processes that starve or hang, a full memory."""
 
 import os
 import resource
