@@ -1,5 +1,6 @@
 """A small text that outlives processes: one file, read once when it is opened, overwritten in place."""
 
+import errno
 import os
 import threading
 import time
@@ -62,7 +63,9 @@ class MemoryFile:
         block = text.encode().ljust(BLOCK_BYTES)
         try:
             if len(block) == BLOCK_BYTES and self._is_open():
-                os.pwrite(self._handle, block, 0)
+                written = os.pwrite(self._handle, block, 0)
+                if written != BLOCK_BYTES:  # as a limit or a full disk allows
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             else:
                 self._replace(block)
         except OSError as error:

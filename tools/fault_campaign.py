@@ -105,6 +105,7 @@ class Outcome:
         found_after_s: From its beginning to the event; NaN if none came.
         commanded_s: On-time commanded to the valve that failed, until the event.
         false_alarms: Faults raised before it began.
+        expected: Faults raised after it that it may raise.
         others: Faults raised after it that it should not raise.
         left_table: By truth.
         hit_neighbour: By truth.
@@ -121,6 +122,7 @@ class Outcome:
     found_after_s: float
     commanded_s: float
     false_alarms: tuple[str, ...]
+    expected: tuple[str, ...]
     others: tuple[str, ...]
     left_table: bool
     hit_neighbour: bool
@@ -211,6 +213,7 @@ class Judge:
             (hits[first] - self.start_ns) * 1e-9 if first else math.nan,
             self.commanded_ms * 1e-3,
             tuple(sorted(self.before)),
+            tuple(sorted(hits)),
             tuple(sorted(self.found.keys() - self.expected)),
             self.left_table,
             self.hit_neighbour,

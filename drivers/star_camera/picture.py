@@ -8,6 +8,7 @@ import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
+from drivers.star_camera.jpeg_data import is_used_up
 from drivers.star_camera.picture_end import (
     BYTES_PER_PIXEL,
     JPEG_START,
@@ -127,6 +128,8 @@ def _decode_jpeg(body: bytes, is_colour: bool) -> NDArray[np.uint8]:
         raise
     except ValueError as error:
         raise PictureRefused("a JPEG is damaged", str(error)) from error
+    if not is_used_up(whole):
+        raise PictureRefused("a JPEG is damaged", "its data go on behind its last block")
     found: NDArray[np.uint8] = image[:, :, 0] if image.shape[2] == 1 else image
     return found
 

@@ -4,7 +4,7 @@ import gc
 import math
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from groundstation.cli.overhead import overhead
 from groundstation.cli.progress import with_progress
 from groundstation.cli.star_pictures import PictureFolder
-from groundstation.data_sets.star_folder import find_frames, load_sky, read_frame
+from groundstation.data_sets.star_folder import DamagedPicture, find_frames, load_sky, read_frame
 from groundstation.declarations.errors import UsageError
 from groundstation.files.number_tables import csv_text
 from groundstation.files.writing import check_targets, whole_folder, write_file
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Detector, detect
-from groundstation.star_tracking.fixes import NoFix, PictureFix
+from groundstation.star_tracking.fixes import NoFix, PictureFix, Refusal
 from groundstation.star_tracking.published import PublishedTracker
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.star_tracking.tracker import StarTracker
@@ -82,7 +82,8 @@ def solve(
     if every_picture and pictures is None:
         raise UsageError("--every-picture needs --pictures, the folder for them.")
     solver = _solver(method, camera, catalogue)
-    solver(read_frame(frames[0], camera))  # the first call pays for memory and lazy imports
+    with suppress(DamagedPicture):
+        solver(read_frame(frames[0], camera))  # the first call pays for memory and lazy imports
     rows = []
     with ExitStack() as stack:
         gc.freeze()  # else the collector now and then looks at every loaded module: 20 ms in a frame's time
@@ -93,7 +94,11 @@ def solve(
                 stack.enter_context(whole_folder(pictures)), camera, catalogue, every_picture
             )
         for path in with_progress(frames, "solving"):
-            image = read_frame(path, camera)
+            try:
+                image = read_frame(path, camera)
+            except DamagedPicture:
+                rows.append(_row(path.stem, NoFix(Refusal.DAMAGED, "", 0), 0.0))
+                continue
             begin = time.process_time()
             answer = solver(image)
             rows.append(_row(path.stem, answer, 1000.0 * (time.process_time() - begin)))

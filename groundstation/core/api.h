@@ -56,6 +56,15 @@ size_t gs_detect_scratch_bytes(int32_t rows, int32_t columns, const DetectorSett
 int32_t gs_detect(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns,
                   const DetectorSettings *settings, uint8_t *scratch, FittedSpot *fitted, DetectionSummary *summary);
 
+/* ---- Seams of a picture: seams.c -------------------------------------------------------------------------------- */
+
+/* Sum the steps from each row to the next and from each column to the next, none counted for more than `most_dn`.
+ *
+ * `down` has (rows - 1, 2) sums: over the left and the right half of the columns; `across` has (2, columns - 1): over the
+ * upper and the lower half of the rows. For pictures of less than 2^31 / 255 rows and columns. */
+void gs_seams(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns, int32_t most_dn, int32_t *down,
+              int32_t *across);
+
 /* ---- Star identification and pose: star_*.c ----------------------------------------------------------------------
  *
  * All structures are filled by star_tracking/search.py, once per tracker but for the picture. Lengths are of the ceiling

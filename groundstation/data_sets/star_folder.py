@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.star_camera.picture import decode_picture
+from drivers.star_camera.refusals import PictureRefused
 from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
 from groundstation.overhead.overhead_camera import OverheadCamera
@@ -13,7 +15,12 @@ from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 _ENDINGS = {".png": b"IEND\xaeB`\x82", ".jpg": b"\xff\xd9", ".jpeg": b"\xff\xd9"}
+_JPEG_START = b"\xff\xd8"
 _SUFFIXES = frozenset({*_ENDINGS, ".bmp", ".pgm", ".tif", ".tiff"})
+
+
+class DamagedPicture(FileError):  # noqa: N818 - it says what happened
+    """A JPEG that its decoder warns of: what it shows may stand elsewhere."""
 
 
 def find_frames(folder: Path, sub_folder: str = "frames") -> list[Path]:
@@ -42,6 +49,7 @@ def read_frame(
         is_colour: Whether it must be in blue-green-red, (h, w, 3), instead of grey, (h, w); None: either.
 
     Raises:
+        DamagedPicture: It is a JPEG that has lost or changed bytes.
         FileError: The file is empty, torn, no picture, in colour or not, not 8 bit, or of another size.
     """
     data = read_bytes(path)
@@ -50,6 +58,11 @@ def read_frame(
     ending = _ENDINGS.get(path.suffix.lower())
     if ending is not None and ending not in data[-64:]:
         raise FileError(f"{path}: is cut short, its end marker is missing.")
+    if data.startswith(_JPEG_START):
+        try:
+            decode_picture({}, data[: data.rfind(_ENDINGS[".jpg"]) + 2])  # some writers add to the end
+        except PictureRefused as refusal:
+            raise DamagedPicture(f"{path}: {refusal}.") from refusal
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise FileError(f"{path}: is no picture that can be decoded.")

@@ -12,6 +12,7 @@ from groundstation.parts.table import installed_tables
 __all__ = ["process", "recorder"]
 
 LATE = (
+    "groundstation.parts.stars.picture_check",
     "groundstation.parts.stars.spot_finder",
     "groundstation.parts.stars.star_tracker",
     "groundstation.parts.stars.picture_keeper",

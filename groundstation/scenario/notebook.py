@@ -8,12 +8,13 @@ t_s, x_m, y_m, heading_rad = flown.truth("alpha")[:4]
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
 from groundstation.control.controller import NO_NEIGHBOURS, Controller
 from groundstation.control.state import BodyWrench, ControlState, Goal
+from groundstation.declarations.errors import UsageError
 from groundstation.scenario.flight_log import Array, VehicleTrack
 from groundstation.scenario.judging import Judged
 from groundstation.scenario.loading import Scenario
@@ -123,14 +124,23 @@ class Flown:
         return self._tracks(vehicle).state.T
 
     def frame(self, vehicle: str) -> Any:  # noqa: ANN401 pandas is an extra
-        """Truth of a vehicle as a pandas DataFrame.
+        """Truth of a vehicle as a pandas DataFrame, a row per sample.
 
         Raises:
-            ImportError: pandas is not installed (extra ``notebook``).
+            UsageError: pandas is not installed (extra ``notebook``).
+            ValueError: t = 0 never came, so nothing was flown.
+            KeyError: There is no such vehicle.
         """
-        import pandas
+        return _pandas().DataFrame(self.truth(vehicle).T, columns=list(COLUMNS))
 
-        return pandas.DataFrame(self.truth(vehicle).T, columns=list(COLUMNS))
+    def limits_frame(self) -> Any:  # noqa: ANN401 pandas is an extra
+        """Every limit and what became of it as a pandas DataFrame, a row each; vehicles joined by ``-``.
+
+        Raises:
+            UsageError: pandas is not installed (extra ``notebook``).
+        """
+        rows = [asdict(limit) | {"vehicles": "-".join(limit.vehicles)} for limit in self.limits]
+        return _pandas().DataFrame(rows, columns=[field.name for field in fields(LimitOutcome)])
 
     def _tracks(self, vehicle: str) -> VehicleTrack:
         if self.judged.flown is None:
@@ -139,6 +149,14 @@ class Flown:
         if vehicle not in tracks:
             raise KeyError(f"there is no vehicle {vehicle!r} (there are: {', '.join(tracks)})")
         return tracks[vehicle]
+
+
+def _pandas() -> Any:  # noqa: ANN401 an extra
+    try:
+        import pandas
+    except ImportError as error:
+        raise UsageError("DataFrames need pandas: pip install 'groundstation[notebook]'.") from error
+    return pandas
 
 
 def run(

@@ -8,6 +8,7 @@ Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O,
 ``stamp_delay``     from the exposure to the arrival, as calibrated
 ``projection``      where stars fall in a picture
 ``picture_repeats`` pictures delivered twice: frozen, in a loop, torn
+``picture_seams``   pictures put together from parts that no lens saw side by side
 ``detection``       picture -> spots with sub-pixel centres and their covariance
 ``rays``            pixel -> point of the ceiling plane relative to the body (full camera model)
 ``sky_index``       catalogue -> tables for constant-time look-ups of stars, triangles and pairs

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.core.library import default_core
+from groundstation.star_tracking.picture_seams import PictureSeams
 
 
 class PictureError(ValueError):
@@ -65,6 +66,7 @@ class Spots:
         hot_pixels: How many groups were dropped as hot pixels.
         cut_by_edge: How many were dropped at the edge.
         is_flooded: More light than a sky of stars can have: nothing was measured.
+        seam: Where the picture is put together from parts; empty if it is whole.
     """
 
     u_px: NDArray[np.float64]
@@ -78,6 +80,7 @@ class Spots:
     hot_pixels: int = 0
     cut_by_edge: int = 0
     is_flooded: bool = False
+    seam: str = ""
 
     def __len__(self) -> int:
         return len(self.u_px)
@@ -105,6 +108,7 @@ class Detector:
         fitted = self._ffi.new("FittedSpot[]", max(settings.max_spots, 1))
         self._fitted = np.frombuffer(self._ffi.buffer(fitted)).reshape(len(fitted), -1)
         self._results = (fitted, self._ffi.new("DetectionSummary *"))
+        self._seams = PictureSeams()
         self._shape = (0, 0)
 
     def find(self, image: NDArray[np.uint8]) -> Spots:
@@ -135,6 +139,7 @@ class Detector:
             summary.hot_pixels,
             summary.cut_by_edge,
             bool(summary.is_flooded),
+            self._seams.find(image),
         )
 
     def _make_room(self, rows: int, columns: int) -> None:

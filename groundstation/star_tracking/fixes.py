@@ -25,6 +25,7 @@ class Refusal(StrEnum):
     NO_CONSENSUS = "no consensus"
     NOT_OUR_CEILING = "not our ceiling"
     TORN = "torn picture"
+    DAMAGED = "damaged picture"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

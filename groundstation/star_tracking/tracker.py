@@ -65,6 +65,8 @@ class StarTracker:
         n = len(spots)
         if spots.is_flooded or spots.background_dn > _WHITE_DN:
             return NoFix(Refusal.FLOODED, "More of the picture is lit than a sky of stars can.", n)
+        if spots.seam:
+            return NoFix(Refusal.TORN, f"{spots.seam[0].upper()}{spots.seam[1:]}.", n)
         needed = self.settings.min_stars if prior is None else self.settings.min_stars_prior
         if n < needed:
             return self._too_few(spots, needed, motion)

@@ -108,7 +108,7 @@ FAULTS: Mapping[str, Fault] = {
               ((0.0, _LAND),), _ITSELF, True, False,
               "Restart the camera.", ("frozen_camera", "repeating_camera")),
         Fault("camera_torn", "Pictures are put together from two exposures.",
-              "rows that are identical to those of the picture before", 1.0,
+              "rows that came before, or stars of two moments in one picture", 1.0,
               ((0.0, _NOTE),), _ITSELF, True, True,
               "Look at the camera's cable and driver.", ("torn_camera",)),
         Fault("fixes_rare", "Fixes come much less often than they did.",

@@ -268,7 +268,9 @@ class Sightings:
             return
         outlook = edge_outlook(own.state, self.keep_in, self.braking_m_s2, reaction_s=REACTION_S)
         if outlook.room_m < -OVERHANG_M:
-            yield "edge_unavoidable", f"it would stop {-1e3 * outlook.room_m:.0f} mm beyond"
+            beyond = f"it would stop {-1e3 * outlook.room_m:.0f} mm beyond"
+            can_brake = self.braking_m_s2 >= LEAST_BRAKING_M_S2
+            yield "edge_unavoidable", beyond if can_brake else "there is nothing left to brake with"
         elif outlook.verdict is not EdgeVerdict.CLEAR:
             yield "edge_ahead", f"it would stop {1e3 * outlook.room_m:.0f} mm before it"
         if not self.others:

@@ -17,8 +17,18 @@ MAY_GO_UNSEEN = {"leaking_valve"}
 WITH_QUICK_FIXES_S = {"star_outage": 1.0}
 """Its row says what holds for the slowest rig; here 15 fixes come a second."""
 
+FOUND = (
+    "battery_low", "camera_frozen", "can_flooded", "can_silent", "coil_fault", "fixes_rare",
+    "imu_clock_jumped", "imu_of_another_vehicle", "imu_shifted", "imu_silent", "imu_stuck",
+    "pushed", "star_outage", "state_silent", "tank_low", "valve_stuck_closed", "valve_stuck_open",
+    "valve_weak", "wrong_fixes",
+)  # fmt: skip
+"""Rows of the table that these flights bring about, each at least once."""
+
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # some thirty flights of forty seconds
+@pytest.mark.provokes(*FOUND)
 def test_every_fault_is_found_and_breaks_no_promise(tmp_path):
     out = tmp_path / "flights.jsonl"
     tool = [sys.executable, str(ROOT / "tools" / "fault_campaign.py"), "--seeds", "1", "--out", str(out)]
@@ -35,3 +45,4 @@ def test_every_fault_is_found_and_breaks_no_promise(tmp_path):
             found = [fault for fault in FAULTS.values() if row["failure"] in fault.failures]
             longest_s = max(WITH_QUICK_FIXES_S.get(fault.id, fault.within_s) for fault in found)
             assert row["found_after_s"] < 2.0 + longest_s, row
+    assert set(FOUND) - {fault for row in rows for fault in row["expected"]} == set()

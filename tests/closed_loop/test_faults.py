@@ -11,6 +11,7 @@ from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.supervision.messages import Faults, ValveShares
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand, ValveSelection, ValveStatus
+from groundstation.supervision.faults import FAULTS
 
 FAULT_S, END_S, STOP_S = 4.0, 6.0, 8.0
 
@@ -83,11 +84,14 @@ def test_a_gyro_stuck_near_its_null_lands_the_vehicle_until_a_person_lets_it_fly
     assert flight.run(6.0).modes()[-1] == "flying"
 
 
+@pytest.mark.provokes("accelerometer_lost")
 @pytest.mark.parametrize(("axis", "name", "usable"), [(0, "x", 0b101), (1, "y", 0b011)])
 def test_a_tilt_chip_that_dies_is_named_and_the_vehicle_flies_on_without_it(fly, axis, name, usable):
     flight = fly(fault("dead_tilt", axis=axis)).run(STOP_S)
     dead = flight.of(Imu, start_s=FAULT_S + 0.1, stop_s=END_S - 0.1)
     assert all(f"tilt_{name}" in imu.reason and not imu.valid and imu.usable == usable for imu in dead)
+    found = next(row for row in flight.of(Faults) if "accelerometer_lost" in row.ids)
+    assert FAULT_S < found.stamp_ns * 1e-9 < FAULT_S + FAULTS["accelerometer_lost"].within_s
     reported = {row.summary for row in flight.published[Diagnostics] if row.node == "alpha/fusion"}
     assert (
         f"alpha/fusion: accelerometer {name} not believed: flying by gyro, fixes and valve commands"

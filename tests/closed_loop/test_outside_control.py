@@ -70,6 +70,7 @@ def sources(flight, start_s):
     return found
 
 
+@pytest.mark.provokes("outside_silent")
 def test_it_flies_and_its_silence_is_a_fault_that_ends_when_it_is_back(fly):
     flight = fly(extra_nodes=[Program([(6.0, 8.0), (14.0, 15.0)], asks=[TAKE])]).run(20.0)
     assert sources(flight, 5.9)[:3] == ["controller", "outside", "brake"]

@@ -190,6 +190,34 @@ def test_a_law_of_the_caller_flies_in_the_place_of_the_rigs(file):
     assert x_m[-1] > -0.5 + 0.05
 
 
+def test_results_are_arrays_and_with_the_extra_data_frames(file):
+    pandas = pytest.importorskip(
+        "pandas", reason="pandas is not installed: pip install groundstation[notebook]"
+    )
+    limit = '[[limits]]\nwhat = "position_error_max_mm"\nvehicle = "all"\nfrom_s = 1.0\nbelow = 500.0\n'
+    flown = scenario.run(scenario.load(file(SHORT + limit)))
+    truth = flown.frame("alpha")
+    assert isinstance(truth, pandas.DataFrame)
+    assert list(truth.columns) == ["t_s", "x_m", "y_m", "heading_rad", "vx_m_s", "vy_m_s"]
+    assert (flown.truth("alpha") == truth.to_numpy().T).all()
+    assert truth.set_index("t_s").x_m.loc[1.0:].between(-0.6, -0.4).all()
+    limits = flown.limits_frame()
+    assert list(limits.vehicles) == ["alpha", "beta"]
+    assert limits.held.all()
+    assert (limits.value < limits.below).all()
+    assert list(limits.value) == [limit.value for limit in flown.limits]
+    with pytest.raises(KeyError, match="no vehicle 'gamma'"):
+        flown.frame("gamma")
+
+
+def test_without_pandas_the_extra_is_named(file, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)  # as where it is not installed
+    flown = scenario.run(scenario.load(file(SHORT)).vary({"duration_s": 0.5}))
+    with pytest.raises(UsageError, match=r"pip install 'groundstation\[notebook\]'"):
+        flown.frame("alpha")
+    assert flown.truth("alpha").shape[0] == 6
+
+
 def hardware(tmp_path, twin):
     """A rig of real devices that names its twin."""
     text = RIG.read_text().split("[laboratory]")[0].replace("laboratory:", "/dev/nowhere_")

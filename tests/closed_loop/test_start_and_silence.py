@@ -59,6 +59,7 @@ def test_no_valve_opens_before_the_vehicle_flies(fly):
     assert not any(status.open_mask for status in flight.of(ValveStatus, stop_s=flying_s))
 
 
+@pytest.mark.provokes("controller_silent")
 def test_a_silent_controller_makes_the_mux_brake(fly):
     flight = fly()
     mute(flight, "controller")

@@ -30,6 +30,18 @@ class StarImage(CameraImage):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PictureTrouble(Message):
+    """A picture that is none of its moment: it was delivered before, or is put together from two.
+
+    Published only of such pictures, with their stamp, before their spots.
+    """
+
+    ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/PictureTrouble"
+    TOPIC: ClassVar = Topic("picture_trouble", rank=Rank.SENSOR)
+    reason: Text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class StarSpots(Message):
     """Spots of light found in one picture, brightest first; stamps and vehicle are the picture's.
 

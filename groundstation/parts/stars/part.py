@@ -14,6 +14,7 @@ from groundstation.parts.stars.fix_reader import FixReader
 from groundstation.parts.stars.gauges import GAUGES
 from groundstation.parts.stars.messages import (
     FixBytes,
+    PictureTrouble,
     SkyChange,
     StarFix,
     StarImage,
@@ -29,6 +30,7 @@ from groundstation.star_tracking.star_catalogue import StarCatalogue
 LINK_SIGMA_S = 0.001
 """What a link takes beyond the age that a pose states, where the rig says nothing of it."""
 # OpenCV loads only where these run
+_CHECK = "groundstation.parts.stars.picture_check:PictureCheck"
 _SPOTS = "groundstation.parts.stars.spot_finder:SpotFinder"
 _TRACKER = "groundstation.parts.stars.star_tracker:StarTracker"
 _KEEPER = "groundstation.parts.stars.picture_keeper:PictureKeeper"
@@ -64,6 +66,13 @@ def _fix_reader(rig: Rig, vehicle: str) -> Node:
     camera = rig.of_type(vehicle, StarsOfType).star_camera
     stamp_sigma_s = camera.delay[1] if camera is not None else LINK_SIGMA_S
     return FixReader(vehicle, stamp_sigma_s, rig.of_type(vehicle, ImuOfType).imu.usual_spread_s)
+
+
+def _picture_check(rig: Rig, vehicle: str) -> Node:
+    from groundstation.parts.stars.picture_check import PictureCheck
+
+    del rig
+    return PictureCheck(vehicle)
 
 
 def _spot_finder(rig: Rig, vehicle: str) -> Node:
@@ -120,9 +129,10 @@ def _check(rig: Rig) -> None:
 PART = Part(
     name="stars",
     summary="pictures of the ceiling become spots, stars and fixes",
-    topics=(StarImage, StarSpots, StarFix, StarMatches, StarPicture, SkyChange, FixBytes),
+    topics=(StarImage, PictureTrouble, StarSpots, StarFix, StarMatches, StarPicture, SkyChange, FixBytes),
     nodes=(
         NodeRow("fix_reader", FLIGHT, Weight.LIGHT, FixReader, _fix_reader, _has_stream),
+        NodeRow("picture_check", SKY, Weight.LIGHT, _CHECK, _picture_check, _has_camera),
         NodeRow("spot_finder", SKY, Weight.HEAVY, _SPOTS, _spot_finder, _has_camera),
         NodeRow(
             "star_tracker",

@@ -10,7 +10,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.stars.messages import StarImage, StarSpots
 from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError
-from groundstation.star_tracking.picture_repeats import PictureRepeats
+from groundstation.star_tracking.fixes import Refusal
 
 _NONE = np.empty(0, np.float32)
 
@@ -33,7 +33,6 @@ class SpotFinder(Node):
         super().__init__(vehicle)
         self._size_px = size_px
         self._detector = Detector(settings)
-        self._repeats = PictureRepeats()
         cv2.setNumThreads(1)  # results must not depend on the number of cores
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
@@ -44,14 +43,13 @@ class SpotFinder(Node):
             yield self._unusable(message, reason)
             return
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
-        reason = self._repeats.complaint_about(image, message.stamp_ns)
-        if reason:
-            yield self._unusable(message, reason)
-            return
         try:
             spots = self._detector.find(image)
         except PictureError as error:
             yield self._unusable(message, str(error))
+            return
+        if spots.seam:
+            yield self._unusable(message, f"{Refusal.TORN}: {spots.seam}")
             return
         yield StarSpots(
             message.stamp_ns,

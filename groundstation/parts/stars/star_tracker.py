@@ -1,6 +1,7 @@
 """Star tracker: light spots in, pose of the body or the reason for none out."""
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Iterator
 
 from drivers.star_camera.exposure import ExposureDelay
@@ -13,7 +14,7 @@ from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.stars import star_answers
 from groundstation.parts.stars.actions import PICTURE
-from groundstation.parts.stars.messages import SkyChange, StarFix, StarMatches, StarSpots
+from groundstation.parts.stars.messages import PictureTrouble, SkyChange, StarFix, StarMatches, StarSpots
 from groundstation.parts.stars.picture_choice import PictureChoice
 from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
@@ -26,6 +27,8 @@ from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 _STILL_M = 1e-3
 """While its rows are read the picture may move so far; beyond, its lights are no witnesses of places."""
+_TROUBLES = 64
+"""Pictures that are none of their moment, the newest ones; spots come a second or two after their picture."""
 REPEATED = "the spots repeat: every light is bit for bit where it was in the picture before"
 """Why there is no fix: the camera, or what finds the spots, is frozen."""
 
@@ -47,7 +50,7 @@ class StarTracker(Node):
         FileError: A file is missing or wrong.
     """
 
-    inputs = (StarSpots, VehicleState, Request)
+    inputs = (PictureTrouble, StarSpots, VehicleState, Request)
     paced = (VehicleState,)
     outputs = (StarFix, SkyChange, StarMatches, CalibrationInUse, Ack)
 
@@ -69,6 +72,7 @@ class StarTracker(Node):
         self._choice = PictureChoice()
         self._delay = delay
         self._last: tuple[bytes, bytes] | None = None
+        self._troubles: OrderedDict[int, str] = OrderedDict()  # of pictures, by their stamps
 
     def start(self, now_ns: int) -> Iterator[Message]:
         content = [file.text() for file in self._files]
@@ -80,6 +84,13 @@ class StarTracker(Node):
         match message:
             case VehicleState():
                 self._states.remember(message)
+            case PictureTrouble():
+                self._troubles[message.stamp_ns] = message.reason
+                if len(self._troubles) > _TROUBLES:
+                    self._troubles.popitem(last=False)
+            case StarSpots() as spots if spots.stamp_ns in self._troubles:
+                reason = self._troubles[spots.stamp_ns]
+                yield star_answers.refusal_message(spots, reason, *self._exposure(spots))
             case StarSpots(reason="") as spots if self._repeats(spots):
                 yield star_answers.refusal_message(spots, REPEATED, *self._exposure(spots))
             case StarSpots(reason="") as spots:

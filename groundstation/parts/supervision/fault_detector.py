@@ -9,6 +9,7 @@ from groundstation.declarations.node import Node
 from groundstation.fusion.hold_up import HoldUp
 from groundstation.parts.fusion.messages import FixAccount, FusionStatus
 from groundstation.parts.imu.messages import USABLE_RATE, Imu
+from groundstation.parts.stars.messages import PictureTrouble
 from groundstation.parts.supervision.messages import Findings, Supervision, ValveShares
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
 from groundstation.supervision.fix_watch import FixWatch
@@ -41,10 +42,11 @@ class FaultDetector(Node):
         valves: Compares motion with commands.
         imu: Compares the gyro with fixes.
         hold_up: Follows how late samples come.
+        has_pictures: Whether fixes are made of pictures that are checked one by one.
     """
 
     inputs: tuple[type[Message], ...] = (
-        Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, PoseFix,
+        Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, PictureTrouble, PoseFix,
     )  # fmt: skip
     outputs = (Findings, ValveShares)
 
@@ -55,9 +57,12 @@ class FaultDetector(Node):
         valves: ValveConsistency,
         imu: ImuConsistency,
         hold_up: HoldUp,
+        *,
+        has_pictures: bool = False,
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
-        self.inputs = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision, *fixes)
+        own = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision)
+        self.inputs = (*own, *((PictureTrouble,) if has_pictures else ()), *fixes)
         self._sources = fixes
         self._imu_watch = ImuWatch()
         self._fix_watch = FixWatch()
@@ -88,6 +93,8 @@ class FaultDetector(Node):
                     self._node_ns = now_ns
             case PoseFix():
                 self._fix(message, now_ns)
+            case PictureTrouble():
+                self._fix_watch.take_picture(now_ns, message.reason)
             case FixAccount():
                 self._account(message, now_ns)
             case FusionStatus():

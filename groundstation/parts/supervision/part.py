@@ -11,7 +11,7 @@ from groundstation.fusion.noise import lag_of_bandwidth
 from groundstation.parts.control.sections import dockings_of, neighbours_of
 from groundstation.parts.fusion.sections import FusionOfType, fused_sources
 from groundstation.parts.imu.sections import ImuOfType
-from groundstation.parts.stars.sections import StarsOfType
+from groundstation.parts.stars.sections import StarsOfType, StarsOfVehicle
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
 from groundstation.parts.supervision.figures import SupervisionFigure
@@ -101,6 +101,7 @@ def _detector(rig: Rig, vehicle: str) -> Node:
         ValveConsistency(type_.model(), valves),
         ImuConsistency(gyro),
         HoldUp(imu.usual_spread_s),
+        has_pictures=rig.vehicle(vehicle, StarsOfVehicle).star_camera is not None,
     )
 
 

@@ -49,6 +49,7 @@ def longest_silence_s(payloads):
     return max(b - a for a, b in itertools.pairwise(stamps)) * 1e-9
 
 
+@pytest.mark.provokes("commands_restarted")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_without_commands_the_valve_node_closes_and_the_vehicle_brakes_or_lands_and_flies_again(
     launch, two_drawn, number
@@ -179,6 +180,7 @@ def test_a_recording_with_a_death_in_it_replays_bit_for_bit(launch, two_drawn):
     assert not report.refused
 
 
+@pytest.mark.provokes("clock_jumped")
 def test_a_recording_of_a_rig_that_was_paused_whole_replays_bit_for_bit(launch, two_drawn):
     run = launch(two_drawn)
     run.wait_until_flying()

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
@@ -20,6 +22,7 @@ WITH_A_LIMIT = (
 )
 
 
+@pytest.mark.provokes("disk_low")
 def test_recording_goes_on_in_another_file_and_the_run_says_so(tmp_path):
     words = ["run", str(RIG), "--headless", "--duration", "14", "--record", str(tmp_path / "run.mcap")]
     done = subprocess.run(

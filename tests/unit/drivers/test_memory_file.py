@@ -87,3 +87,29 @@ def test_what_cannot_be_read_or_written_is_said(path):
     gone = MemoryFile(path.parent / "nowhere" / "alpha.json")
     with pytest.raises(DeviceError, match="cannot be written: No such file"):
         gone.write("text")
+
+
+def test_a_write_that_is_cut_short_is_none(path):
+    """A limit or a full disk may take a part of a block and call that a success."""
+    script = (
+        "import pathlib, resource, sys; from drivers.errors import DeviceError;"
+        "from drivers.memory_file import MemoryFile\n"
+        "memory = MemoryFile(pathlib.Path(sys.argv[1]))\n"
+        "memory.write('x' * 500)\n"
+        "before = resource.getrlimit(resource.RLIMIT_FSIZE)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))\n"
+        "for _ in '12':\n"
+        "    try:\n"
+        "        memory.write('y' * 500)\n"
+        "    except DeviceError as error:\n"
+        "        print(error)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, before)\n"
+        "memory.write('y' * 500)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)], check=True, capture_output=True, text=True
+    )
+    lines = done.stdout.splitlines()
+    assert len(lines) == 2
+    assert all("cannot be written: No space left on device" in line for line in lines)
+    assert kept(path) == ("y" * 500, "")

@@ -12,6 +12,7 @@ from groundstation.declarations.request import Ack, Request
 from groundstation.declarations.rig_file import RigFile
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.stars.messages import StarFix, StarImage, StarMatches, StarPicture, StarSpots
+from groundstation.parts.stars.picture_check import PictureCheck
 from groundstation.parts.stars.picture_keeper import PictureKeeper
 from groundstation.parts.stars.spot_finder import SpotFinder
 from groundstation.parts.stars.star_answers import notes_of
@@ -27,7 +28,7 @@ POSE = (2.4, 1.9, 0.7)
 
 
 class Sky:
-    """The three nodes of a vehicle's sky, fed by hand."""
+    """The four nodes of a vehicle's sky, fed by hand."""
 
     def __init__(self, folder, painter, exposure_s=0.01):
         camera, ceiling = folder / "camera.json", folder / "ceiling.csv"
@@ -36,6 +37,7 @@ class Sky:
         ceiling.write_text("\n".join(["id,x_m,y_m", *rows]) + "\n")
         settings = TrackerSettings(exposure_s=exposure_s)
         self.nodes = [
+            PictureCheck("alpha"),
             SpotFinder("alpha", (painter.camera.width, painter.camera.height)),
             StarTracker(
                 "alpha", *(RigFile(path, path.read_bytes()) for path in (camera, ceiling)), DELAY, settings

@@ -92,6 +92,24 @@ def test_a_bad_picture_is_named_and_nothing_is_written(call, ceiling_folder, tmp
     assert sorted(p.name for p in folder.iterdir()) == ["camera.json", "ceiling.csv", "frames"]
 
 
+def test_a_jpeg_that_lost_bytes_gets_its_row_and_no_fix(call, ceiling_folder, tmp_path, painter):
+    folder = copy_of(ceiling_folder, tmp_path)
+    whole = cv2.imencode(".jpg", painter.paint(np.random.default_rng(62), POSES[0]))[1].tobytes()
+    for name, file in (
+        ("00000", whole[: len(whole) // 3] + whole[len(whole) // 3 + 300 :]),
+        ("00003", whole + b"written by a camera"),
+        ("00004", whole[:-2] + b"\x3a\x51\x07" + whole[-2:]),
+    ):
+        (folder / "frames" / f"{name}.png").unlink(missing_ok=True)
+        (folder / "frames" / f"{name}.jpg").write_bytes(file)
+    call("solve", folder, "--out", tmp_path / "answers.csv")
+    with (tmp_path / "answers.csv").open(newline="") as file:
+        rows = {row["frame"]: row for row in csv.DictReader(file)}
+    assert [row["fix"] for row in rows.values()] == ["0", "1", "0", "1", "0"]
+    assert rows["00000"]["reason"] == rows["00004"]["reason"] == "damaged picture"
+    assert float(rows["00003"]["x_m"]) == pytest.approx(POSES[0][0], abs=1e-4)
+
+
 def test_missing_folders_files_and_targets_are_named(call, ceiling_folder, tmp_path):
     with pytest.raises(FileError, match="no such folder"):
         call("solve", tmp_path / "nowhere", "--out", tmp_path / "a.csv")
