@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.control.nearest_point import nearest_point
+from groundstation.control.half_planes import nearest_point
 from groundstation.control.state import BodyWrench, Vector2, bounded, clamp
 from groundstation.control.valve_health import HEALTHY, ValveHealth, shares
 from groundstation.control.vehicle import VehicleModel

@@ -8,6 +8,7 @@ from groundstation.supervision.fault_board import FaultBoard, Standing
 from groundstation.supervision.faults import Clears, Response
 from groundstation.supervision.mode_machine import GRACE_S, Memory, ModeMachine, Then
 from groundstation.supervision.modes import ALOFT, BRAKEABLE, GROUNDED, GUARANTEES, Air, Event, Law, Mode
+from groundstation.supervision.seen_faults import faults_seen
 from groundstation.supervision.sightings import Sightings
 
 LIFT_S = 0.3
@@ -117,7 +118,8 @@ class Supervisor:
         sightings.look(now_ns, self._period_ns)
         self._follow_node(now_ns)
         mode = machine.mode
-        found = sightings.found(
+        found = faults_seen(
+            sightings,
             now_ns,
             is_grounded=mode in GROUNDED,
             is_aloft=mode in ALOFT,
@@ -183,7 +185,7 @@ class Supervisor:
         """A stop without a state to brake on, or without room, cuts the air at once."""
         sightings = self.sightings
         if self.mode in BRAKEABLE:
-            found = sightings.found(now_ns, is_grounded=False, is_aloft=True, may_open=True)
+            found = faults_seen(sightings, now_ns, is_grounded=False, is_aloft=True, may_open=True)
             hopeless = found.keys() & _HOPELESS
             if hopeless:
                 self._machine.happen(Event.FAULT_CUTS, now_ns, min(hopeless))

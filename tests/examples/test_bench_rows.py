@@ -121,3 +121,19 @@ def test_success_in_too_few_flights_shows_nothing(bench):
     assert rows.success_row(success, [*flights[1:], {"verdict": "failed"}]).ok is False
     assert rows.success_row(success, flights[:20]).ok is None
     assert rows.success_row(success, []).ok is False
+
+
+def test_a_docking_is_judged_by_its_first_contact_and_what_failed_later_is_said(bench):
+    rows = bench("flying_formation")
+    success = rows.Success("docks", "dock_still", 2, 3, 3, below=rows.SOFT)
+    soft = {"beta.contact_speed_mm_s": 8.0, "beta.contact_lateral_mm": 1.0}
+    flights = [
+        {"verdict": "passed", "figures": soft},
+        {"verdict": "failed", "figures": soft},
+        {"verdict": "failed", "figures": {**soft, "beta.contact_speed_mm_s": 25.0}},
+    ]
+    row = rows.success_row(success, flights)
+    assert (row.measured, row.ok) == ("2 of 3; 1 of them failed later", True)
+    assert (
+        rows.success_row(success, [flights[0], flights[2], {"verdict": "failed", "figures": {}}]).ok is False
+    )

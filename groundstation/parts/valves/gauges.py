@@ -11,7 +11,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.view import NOTHING, Cell, Gauge, GaugeRow, Level, Newest, cell
 from groundstation.parts.operation.messages import Diagnostics
 from groundstation.parts.valves.messages import Outlook, ValveCommand, ValveSelection, ValveStatus
-from groundstation.supervision.sightings import LEAST_TANK_PA
+from groundstation.supervision.seen_faults import LEAST_TANK_PA
 
 SILENT_S = 3.0
 """So long after the bus was opened a valve node should have reported."""

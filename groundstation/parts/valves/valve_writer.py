@@ -10,7 +10,7 @@ from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.supervision.messages import StopPress, Supervision
 from groundstation.parts.valves.messages import NO_STOP, CanIn, CanOut, ValveCommand, ValveStatus
-from groundstation.supervision.sightings import COIL_FAULT
+from groundstation.supervision.seen_faults import COIL_FAULT
 
 FLOAT_RETRY_NS = 100_000_000
 COUNTED_NS = 250_000_000

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from groundstation.control.corridor import Corridor, Docking
-from groundstation.supervision.sightings import ONLY_ALOFT
+from groundstation.supervision.seen_faults import ONLY_ALOFT, faults_seen
 
 MS = 1_000_000
 S = 1000 * MS
@@ -23,7 +23,7 @@ def known(sightings, seen, node):
 
 
 def found(known, now_ns=20 * S, *, is_grounded=False, is_aloft=True, may_open=True):
-    return known.found(now_ns, is_grounded=is_grounded, is_aloft=is_aloft, may_open=may_open)
+    return faults_seen(known, now_ns, is_grounded=is_grounded, is_aloft=is_aloft, may_open=may_open)
 
 
 def test_where_all_is_well_nothing_is_found(known):

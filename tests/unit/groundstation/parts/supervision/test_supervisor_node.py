@@ -22,6 +22,7 @@ from groundstation.parts.supervision.messages import (
 )
 from groundstation.parts.supervision.supervisor_node import PERIOD_NS, SupervisorNode
 from groundstation.parts.valves.messages import OutsideControl, ValveStatus
+from groundstation.supervision.seen_faults import faults_seen
 from groundstation.supervision.sightings import Sightings
 from groundstation.supervision.supervisor import Supervisor
 
@@ -205,7 +206,7 @@ class TestWhatItSees:
         node.receive(ValveShares(0, "alpha", tuple(open_ratio), tuple(shut_ratio)))
         assert node.known.braking_m_s2 == pytest.approx(braking_m_s2)
         assert bool(node.known.missing_thrust) is is_missing
-        found = dict(node.known._thrust())
+        found = faults_seen(node.known, node.now_ns, is_grounded=True, is_aloft=True, may_open=False)
         assert ("thrust_missing" in found) is is_missing
 
     def test_demands_and_findings(self, node):
