@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.edge import braking_to_count_on
@@ -26,6 +26,7 @@ from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2,
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.files.plain_model import PlainModel
 
 if TYPE_CHECKING:
     from groundstation.control.trajectories import Plan, Reconfiguration
@@ -42,7 +43,7 @@ _FILTER = SafetyFilterConfig()
 _STOPPING_GAP_M = 0.04  # what the filter keeps between hulls, and what estimates are off by
 
 
-class TrajectoryConfig(BaseModel):
+class TrajectoryConfig(PlainModel):
     """From where to where, and what is kept to.
 
     Attributes:
