@@ -173,7 +173,8 @@ class GuideNode(Node):
             self._has_begun = not hindrance
             return hindrance if now_ns - began_ns >= BEGIN_NS else ""
         if now_ns - (self._received_ns or began_ns) > SILENCE_NS:
-            return "nothing was received from the vehicle for 10 s."
+            what = "nothing was received from the vehicle for 10 s"
+            return f"{what}: its run has ended or hangs; nothing was written."
         return self._guide.trouble() if self._author else ""
 
 

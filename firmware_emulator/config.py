@@ -15,7 +15,10 @@ from drivers.valve_bus.protocol import MAX_VEHICLES
 from firmware_emulator.applicability import why_not
 from firmware_emulator.failures import FAILURE_KINDS, FailureConfig
 from firmware_emulator.mock_up_config import VehicleConfig
-from firmware_emulator.settings import Fraction, NonNegative, Pair, Positive, Settings
+from firmware_emulator.settings import Fraction, NonNegative, Positive, Settings
+
+Slope = Annotated[float, Field(ge=-0.1, le=0.1)]
+"""No mock-up stays on a table that leans by more."""
 
 
 class TableConfig(Settings):
@@ -23,7 +26,7 @@ class TableConfig(Settings):
 
     bounds_m: tuple[float, float, float, float] = (-2.0, 2.0, -1.5, 1.5)
     """x_min, x_max, y_min, y_max of the table's surface, table frame."""
-    tilt_rad: Pair = (0.0, 0.0)
+    tilt_rad: tuple[Slope, Slope] = (0.0, 0.0)
     """Mean gradient of the surface's height along table x and y; 0.3 mrad gives 3 mm/s^2."""
     waviness_rad: NonNegative = 5e-5
     """Standard deviation of the local gradient about the mean one, per axis."""

@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from drivers.files.amounts import check_amounts
+from drivers.files.plain_model import PlainModel
 from firmware_emulator.failure_kinds import FAILURE_KINDS, FailureKind, Parameter, checked
 
 __all__ = ["FAILURE_KINDS", "Failure", "FailureConfig", "FailureKind", "Failures", "Parameter", "checked"]
@@ -21,7 +22,7 @@ NS_PER_S = 1_000_000_000
 _KEPT_NS = 60 * NS_PER_S  # a device asks about moments that lie back by an exposure or a line's queue
 
 
-class FailureConfig(BaseModel):
+class FailureConfig(PlainModel):
     """One failure of a scenario: a row of `[[laboratory.failures]]`.
 
     After reading, `parameters` holds all of the kind's. Kinds are those of the validation context's

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from drivers.files.amounts import check_amounts
+from drivers.files.plain_model import PlainModel
 
 _UNBOUNDED = ("seed", "seed_offset", "end_s")  # numbers without a size, and what may last for ever
 
@@ -14,7 +15,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class Settings(BaseModel):
+class Settings(PlainModel):
     """What all tables share: unknown keys are errors, values do not change after reading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

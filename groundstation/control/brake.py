@@ -8,15 +8,16 @@ and no memory, only a fresh state.
 import math
 from dataclasses import replace
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.state import BodyWrench, ControlState, limit_length, rotate
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 
-class BrakeConfig(BaseModel):
+class BrakeConfig(PlainModel):
     """Damping and the speeds below which braking ends.
 
     Attributes:

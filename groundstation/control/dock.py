@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.corridor import Corridor
@@ -19,6 +19,7 @@ from groundstation.control.go_to import GoTo, GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2, rotate
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 _STEP_RAD = math.radians(25.0)  # ahead of it on the way round to the gate
@@ -40,7 +41,7 @@ class Phase(enum.StrEnum):
     DOCKED = "has touched"
 
 
-class DockConfig(BaseModel):
+class DockConfig(PlainModel):
     """Whom to dock with, and how.
 
     Attributes:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from groundstation.control.at_setpoint import AtSetpoint
 from groundstation.control.go_to import GoToConfig
@@ -17,12 +17,13 @@ from groundstation.control.keep_in import KeepIn
 from groundstation.control.motion_watch import Acceleration
 from groundstation.control.state import ControlState, Goal, Vector2
 from groundstation.control.vehicle import NEAREST_M, VehicleModel
+from groundstation.files.plain_model import PlainModel
 
 WIDER_M, WIDENING_S = 0.15, 3.0
 """A silent leader is given so much more room, over so long; then the place is held."""
 
 
-class FollowConfig(BaseModel):
+class FollowConfig(PlainModel):
     """Whom to follow, and how.
 
     Attributes:

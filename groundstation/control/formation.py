@@ -11,17 +11,18 @@ held at rest.
 import math
 from collections.abc import Mapping
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from groundstation.control.at_setpoint import AtSetpoint
 from groundstation.control.go_to import GoToConfig
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import ControlState, Goal, Vector2, rotate
 from groundstation.control.vehicle import VehicleModel
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 
-class RelativePose(BaseModel):
+class RelativePose(PlainModel):
     """Where to be relative to one neighbour.
 
     Attributes:
@@ -40,12 +41,12 @@ class RelativePose(BaseModel):
     weight: float = Field(default=1.0, gt=0.0)
 
 
-class FormationConfig(BaseModel):
+class FormationConfig(PlainModel):
     """Neighbours by name, how much the own goal counts, and how to get there."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    neighbours: dict[str, RelativePose] = {}
+    neighbours: dict[str, RelativePose] = Field(default_factory=dict)
     goal_weight: float = Field(default=0.0, ge=0.0)
     go_to: GoToConfig = GoToConfig()
 

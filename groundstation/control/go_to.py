@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from groundstation.control.authority import Authority, authority_along
 from groundstation.control.coasting import CoastingWay, least_gas
@@ -26,6 +26,7 @@ from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 LEAD_S = 0.1
@@ -42,7 +43,7 @@ LEAST_WAY_M, AT_REST_M_S = 0.02, 1e-3
 """A shorter way, or one that begins in motion, is not planned for coasting."""
 
 
-class GoToConfig(BaseModel):
+class GoToConfig(PlainModel):
     """Limits of the way, and the law that follows it.
 
     Attributes:

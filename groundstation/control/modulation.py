@@ -12,20 +12,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from groundstation.control.allocation import Allocator
 from groundstation.control.sag import Span, sagged_spans
 from groundstation.control.state import BodyWrench
 from groundstation.control.valve_health import ValveHealth
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.files.plain_model import PlainModel
 
 MS_PER_S = 1000.0
 MAX_ON_MS = 127  # seven bits on the wire
 CARRIED_PULSES = 3.0  # at most three valves of a sparse plan can wait below the least on-time
 
 
-class PulseConfig(BaseModel):
+class PulseConfig(PlainModel):
     """How the valves are driven.
 
     The period should be a multiple of the bus period (20 ms), for that is when a pulse can start.

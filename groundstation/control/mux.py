@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
+
+from groundstation.files.plain_model import PlainModel
 
 Demand = TypeVar("Demand")
 NS_PER_S = 1_000_000_000
@@ -26,7 +28,7 @@ class Source(StrEnum):
     CLOSED = "closed"
 
 
-class MuxConfig(BaseModel):
+class MuxConfig(PlainModel):
     """How long each input stays fresh; from its rate: about three periods.
 
     Attributes:

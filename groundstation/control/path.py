@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.curves import Curve, FigureEight, Perimeter, sampled, tightest_per_m
@@ -21,10 +21,11 @@ from groundstation.control.reference import MotionLimits, PointReference
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 
-class PathConfig(BaseModel):
+class PathConfig(PlainModel):
     """A way over the table.
 
     Attributes:

@@ -18,11 +18,12 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.half_planes import HalfPlane, nearest
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Vector2, rotate
+from groundstation.files.plain_model import PlainModel
 
 RESTING_M = 0.06
 """Off an edge or another body: what is held there drifts a little, and nobody should have to brake for it."""
@@ -30,7 +31,7 @@ EDGE, TURN_RATE = "edge", "turn rate"
 _SLOWEST_BRAKING_M_S2 = 1e-6
 
 
-class SafetyFilterConfig(BaseModel):
+class SafetyFilterConfig(PlainModel):
     """How early it takes hold.
 
     Attributes:

@@ -8,7 +8,7 @@ shrunk by a dead band (soft, so that the law has no step); the disturbance is pa
 import math
 from collections.abc import Mapping
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.gains import lqr_gains
@@ -25,6 +25,7 @@ from groundstation.control.state import (
 )
 from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 LEARNING_SHARE = 0.5
@@ -32,7 +33,7 @@ LEARNING_SHARE = 0.5
 push, by which valves differ, would pass for a slope."""
 
 
-class StationConfig(BaseModel):
+class StationConfig(PlainModel):
     """Weights and limits of station keeping.
 
     Attributes:

@@ -12,13 +12,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from groundstation.control.controller import NO_NEIGHBOURS, span_of
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.state import BodyWrench, ControlState, Goal, Vector2
 from groundstation.control.station import StationConfig, StationKeeping
 from groundstation.control.vehicle import VehicleModel
+from groundstation.files.plain_model import PlainModel
 from groundstation.frames import wrap_angle
 
 FASTEST_DEG_S = 30.0
@@ -27,7 +28,7 @@ STEP_S = 0.05
 Vector3 = tuple[float, float, float]
 
 
-class TumbleConfig(BaseModel):
+class TumbleConfig(PlainModel):
     """How the target moves.
 
     Attributes:

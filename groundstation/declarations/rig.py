@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
 from drivers.errors import Refused
 from drivers.socket_url import check_socket_url
@@ -21,9 +21,10 @@ from groundstation.control.keep_in import KeepIn, rectangle
 from groundstation.control.surroundings import Obstacle
 from groundstation.declarations.names import PATTERN
 from groundstation.declarations.rig_file import RigFile
-from groundstation.declarations.section import Delay, Positive, Section, Sigma
+from groundstation.declarations.section import Delay, Positive, Section, Sigma, Words
 from groundstation.declarations.vehicle_type import VehicleType
 from groundstation.files.errors import FileError
+from groundstation.files.plain_model import PlainModel
 from groundstation.fusion.levelling import levelling
 from groundstation.fusion.slope_grid import SlopeGrid, slope_grid
 from groundstation.fusion.table_map import TableMap
@@ -172,7 +173,7 @@ class NodeSection(Section):
         return self
 
 
-class LaboratorySection(BaseModel):
+class LaboratorySection(PlainModel):
     """The emulated laboratory: an installed entry point; the other keys are its own.
 
     Attributes:
@@ -199,7 +200,7 @@ class Rig(Section):
 
     tables: ClassVar[Tables]
 
-    name: str
+    name: Words
     table: TableSection
     mock_ups: dict[str, VehicleType]
     vehicles: dict[VehicleName, VehicleSection] = Field(min_length=1)

@@ -2,9 +2,11 @@
 
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
+from groundstation.declarations.calls import shortened
 from groundstation.files.amounts import UNITLESS, check_amounts
+from groundstation.files.plain_model import PlainModel
 
 LEAST = 1e-9
 Positive = Annotated[float, Field(gt=0, le=UNITLESS)]
@@ -15,7 +17,18 @@ Delay = Annotated[float, Field(ge=0, le=10.0)]
 """A delay or its standard deviation, in s."""
 
 
-class Section(BaseModel):
+def _is_plain(text: str) -> str:
+    """Refuse what would move a terminal's cursor or break a report."""
+    if not text.strip() or not text.isprintable():
+        raise ValueError(f"expected words on one line, without control characters, found {shortened(text)!r}")
+    return text
+
+
+Words = Annotated[str, Field(max_length=200), AfterValidator(_is_plain)]
+"""What stands in terminals, recordings and reports."""
+
+
+class Section(PlainModel):
     """A table of the rig file: unknown keys, infinities, NaN and what its unit cannot mean are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)

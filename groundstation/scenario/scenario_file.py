@@ -7,15 +7,16 @@ TOML, metres, seconds, degrees; every key names its unit.
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from groundstation.declarations.calls import in_one_line, shortened
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.names import PATTERN
 from groundstation.declarations.rig import HoldSection
-from groundstation.declarations.section import Section
+from groundstation.declarations.section import Section, Words
 from groundstation.declarations.validation import first_sentence
 from groundstation.files.errors import FileError
+from groundstation.files.plain_model import PlainModel
 from groundstation.files.toml_file import toml_of
 from groundstation.scenario.quantities import QUANTITIES
 
@@ -25,17 +26,6 @@ ALL, FOLLOWERS = "all", "followers"
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Span = Annotated[float, Field(gt=0.0, le=86400.0)]
 Name = Annotated[str, Field(pattern=f"^{PATTERN}$")]
-
-
-def _is_plain(text: str) -> str:
-    """Refuse what would move a terminal's cursor or break a report."""
-    if not text.strip() or not text.isprintable():
-        raise ValueError(f"expected words on one line, without control characters, found {shortened(text)!r}")
-    return text
-
-
-Words = Annotated[str, Field(max_length=200), AfterValidator(_is_plain)]
-"""What stands in terminals, recordings and reports."""
 
 
 class ScenarioError(UsageError):
@@ -180,7 +170,7 @@ class Dispersion(Section):
         return next(name for name in self.laws() if getattr(self, name) is not None)
 
 
-class ScenarioFile(BaseModel):
+class ScenarioFile(PlainModel):
     """A whole scenario file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

@@ -194,6 +194,7 @@ def test_no_command_begins_before_it_knows_that_it_can_write(made, tmp_path, nam
         tmp_path / "nowhere" / "x",
         tmp_path / "pipe",
         tmp_path / ("x" * 300),
+        Path("/proc/nothing_can_be_written_here"),
     ):
         words = command.format(here=made / name).split()
         words[words.index("--out") + 1] = str(target)
@@ -209,3 +210,14 @@ def test_a_name_as_long_as_the_disk_takes_is_written(made, tmp_path):
     long = tmp_path / f"{'x' * 246}.toml"
     assert call(["calibrate", "zero-offset", str(made / "rest"), "--out", str(long)]) == 0
     assert [path.name for path in tmp_path.iterdir()] == [long.name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "command"), TRIALS, ids=lambda words: words.partition(" --out")[0])
+def test_every_command_works_where_the_terminal_knows_ascii_only(made, name, command):
+    words = [sys.executable, "-m", "groundstation", *command.format(here=made / name).split()]
+    plain = {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(words, capture_output=True, check=False, cwd=ROOT, env=os.environ | plain)
+    said = (done.stdout + done.stderr).decode("ascii")  # raises where another sign got through
+    assert done.returncode == 0, said
+    assert "Traceback" not in said
