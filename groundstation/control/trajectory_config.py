@@ -2,12 +2,13 @@
 
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.safety_filter import SafetyFilterConfig
 from groundstation.control.state import Vector2
 from groundstation.control.station import StationConfig
+from groundstation.files.plain_model import PlainModel
 
 if TYPE_CHECKING:
     from groundstation.control.trajectories import Margins, Reconfiguration
@@ -17,7 +18,7 @@ FILTER = SafetyFilterConfig()
 _STOPPING_GAP_M = 0.04  # what the filter keeps between hulls, and what estimates are off by
 
 
-class TrajectoryConfig(BaseModel):
+class TrajectoryConfig(PlainModel):
     """From where to where, and what is kept to.
 
     Attributes:
