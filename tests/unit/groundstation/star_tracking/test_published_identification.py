@@ -133,6 +133,7 @@ def test_the_longest_run_is_close_along_both_axes_for_every_pair():
             (0.06, 0.01),  # 0.06 from the first
             (3.00, 3.00),
             (3.01, 3.01),
+            (0.01, 0.09),  # 0.04 from one of the run along y, 0.09 from another
         ]
     )
     assert longest_run(places, 0.05).tolist() == [0, 2, 3]
