@@ -28,7 +28,7 @@ def folder_files(data: FlightData, more: Mapping[str, Any], scenario: str) -> di
         scenario: What was flown.
     """
     files = {
-        "imu.csv": _csv(IMU_COLUMNS, data.imu, "%.6f,%.8f,%.7f,%.7f,%.3f"),
+        "imu.csv": _csv(IMU_COLUMNS, data.imu, "%.6f,%.8f,%.7f,%.7f,%.6f"),
         "stars.csv": _csv(STAR_COLUMNS, data.stars, "%.6f,%.6f,%.6f,%.6f,%.7f"),
         "meta.json": json.dumps(
             {
