@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.declarations.errors import UsageError
 from groundstation.fusion.flight_data import FlightData
+from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.imu.messages import Imu
 from groundstation.parts.scenario.messages import ScenarioStatus
 from groundstation.parts.stars.messages import StarFix
@@ -32,11 +33,13 @@ class Flown:
     Attributes:
         data: Packets, fixes and truth; s from the first sample.
         tries: Of the star tracker: exposure s, arrival s, 1 for a fix; shape (n, 3).
+        states: As it was flown: s, x, y, heading, velocity x, y, rate; shape (k, 7).
         zero_s: When t = 0 of the scenario was.
     """
 
     data: FlightData
     tries: Array
+    states: Array
     zero_s: float
 
     def truth(self, t_s: Array) -> Array:
@@ -79,11 +82,12 @@ def read_flown(recording: Path) -> Flown:
         return Flown(data, *_more(source, vehicle, recording))
 
 
-def _more(source: Recording, vehicle: str, path: Path) -> tuple[Array, float]:
-    """Read the tries of the star tracker and t = 0, on the clock of the flight's data."""
+def _more(source: Recording, vehicle: str, path: Path) -> tuple[Array, Array, float]:
+    """Read the tries of the star tracker, the states and t = 0, on the clock of the flight's data."""
     origin_ns = zero_ns = 0
     tries: list[tuple[float, float, float]] = []
-    for message in source.messages((Imu, StarFix, ScenarioStatus)):
+    states: list[tuple[float, ...]] = []
+    for message in source.messages((Imu, StarFix, VehicleState, ScenarioStatus)):
         payload = message.payload
         match payload:
             case Imu(valid=True) if not origin_ns and payload.vehicle == vehicle:
@@ -91,8 +95,14 @@ def _more(source: Recording, vehicle: str, path: Path) -> tuple[Array, float]:
             case StarFix() if origin_ns:
                 exposure_s, arrival_s = payload.stamp_ns - origin_ns, message.log_ns - origin_ns
                 tries.append((exposure_s * 1e-9, arrival_s * 1e-9, float(payload.fix)))
+            case VehicleState() if origin_ns:
+                pose = (*payload.position_table_m, payload.heading_rad)
+                motion = (*payload.velocity_table_m_s, payload.rate_rad_s)
+                states.append(((payload.stamp_ns - origin_ns) * 1e-9, *pose, *motion))
             case ScenarioStatus() if payload.zero_ns:
                 zero_ns = payload.zero_ns
     if not zero_ns:
         raise UsageError(f"{path}: the flight never began.")
-    return np.array(tries).reshape(-1, 3), (zero_ns - origin_ns) * 1e-9
+    flown = np.array(states).reshape(-1, 7)
+    flown[:, 3] = np.unwrap(flown[:, 3])
+    return np.array(tries).reshape(-1, 3), flown, (zero_ns - origin_ns) * 1e-9

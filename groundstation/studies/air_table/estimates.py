@@ -32,6 +32,13 @@ def estimated(flown: Flown, method: str) -> Array:
     return rows
 
 
+def as_flown(flown: Flown) -> Array:
+    """Return the states that the flight itself went by, in the same columns."""
+    rows = flown.states.copy()
+    rows[:, 0] -= flown.zero_s
+    return rows
+
+
 def off_truth(flown: Flown, rows: Array) -> Array:
     """Return an estimate minus the truth: x, y, heading, velocity x, y, rate; shape (6, n)."""
     off = rows[:, 1:].T - flown.truth(rows[:, 0] + flown.zero_s)

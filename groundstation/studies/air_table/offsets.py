@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from groundstation.fusion.published_stretch import PublishedStretch, fit_published_stretch
-from groundstation.studies.air_table.estimates import estimated, off_truth, rms
+from groundstation.studies.air_table.estimates import as_flown, off_truth, rms
 from groundstation.studies.flown import Flown
 from groundstation.studies.plots import Axes, Line, over_time
 from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number, Sides
@@ -36,7 +36,7 @@ def draw_offset_fit(flights: Mapping[str, Sides]) -> Drawn:
     default = flights["pulses"][DEFAULT]
     ours_mm = []
     for span_s in (SHORT_S, LONG_S):
-        rows = estimated(default, "filter")
+        rows = as_flown(default)
         start_s = default.data.run_start_s - default.zero_s
         inside = rows[(rows[:, 0] > start_s) & (rows[:, 0] < start_s + span_s)]
         ours_mm.append(1e3 * rms(off_truth(default, inside)[:2]))
@@ -77,8 +77,7 @@ def draw_offset_fit(flights: Mapping[str, Sides]) -> Drawn:
     ]
     words = (
         "Over ten seconds one constant pair takes most of the drift away; over twenty what is left has "
-        "grown: the "
-        "offsets that the flight feels are no constants."
+        "grown: the offsets that the flight feels are no constants."
     )
     return Drawn(pictures, numbers, words)
 

@@ -97,8 +97,7 @@ def draw_perimeter(flights: Mapping[str, Sides]) -> Drawn:
     ]
     words = (
         "A try fails where no two triangles place the camera alike: here, where LEDs are dimmer than the "
-        "level "
-        "below which a pixel becomes zero. The times are whole multiples of 0.6 s, as published."
+        "level below which a pixel becomes zero. The times are whole multiples of 0.6 s, as published."
     )
     return Drawn(pictures, numbers, words)
 
@@ -161,14 +160,14 @@ def draw_rest(flights: Mapping[str, Sides]) -> Drawn:
             "scatter of x at rest, mm (1 sigma)",
             AT_BEST_MM,
             scatter_mm,
-            "published is 'about one millimetre at best', read off one coordinate",
-            ratio=2.0,
+            "published is 'of the order of one millimetre' at best",
+            ratio=3.0,
         ),
         Number.beside("mean of x off its true value, mm", NAN, off_mm, "no truth was published"),
     ]
     words = (
-        "The scatter comes from the same stars in other triangles from picture to picture; the mean is off "
-        "because "
-        "an affine map knows nothing of the lens's distortion. Our defaults are calibrated for both."
+        "The scatter comes from the same stars in other triangles from picture to picture; the mean is "
+        "off because an affine map knows nothing of the lens's distortion. Our defaults are calibrated "
+        "for both."
     )
     return Drawn(pictures, numbers, words)
