@@ -17,6 +17,7 @@ from calibration.imu import noise, procedures
 from calibration.imu import tilt as tilt_procedure
 from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
+from groundstation.cli.plot_option import Plot
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.fusion.flight_data import FlightData
@@ -26,7 +27,6 @@ Source = Annotated[
     Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, meta.json (and stars.csv).")
 ]
 Out = Annotated[Path, typer.Option(help="TOML to write.")]
-Plot = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
 Vehicle = Annotated[str | None, typer.Option(help="Of a recording with several vehicles.")]
 
 

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
@@ -80,7 +81,7 @@ def run(
         float | None,
         typer.Option(help="Our addition to them: constant offsets fitted in the loop after so many seconds."),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="PNG to draw as well.")] = None,
+    plot: Plot = None,
 ) -> None:
     """Estimate the motion in a data set; causal, as if it were live, unless --smooth.
 
@@ -89,7 +90,7 @@ def run(
 
     Example: groundstation fusion run try/flight --out estimate.csv
 
-    Example: groundstation fusion run try/flight --out imu.csv --method imu --plot imu.png
+    Example: groundstation fusion run try/flight --out estimate.csv --method imu --plot estimate.png
     """
     if out.name == "fixes.csv":
         raise UsageError("--out must not be called fixes.csv: the account of the fixes goes there.")

@@ -21,9 +21,9 @@ def export(
 
     truth.csv is written where the recording holds poses of a reference system, for judging results only.
 
-    Example: groundstation recording export run.mcap --fusion-folder flight
+    Example: groundstation recording export run.mcap --fusion-folder try/again
 
-    Example: groundstation fusion run flight --out again.csv --method reintegration
+    Example: groundstation fusion run try/again --out estimate.csv --method reintegration
     """
     try:
         with opened(file) as (recording, rig):

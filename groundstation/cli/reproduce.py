@@ -32,9 +32,9 @@ def reproduce(
 
     Example: groundstation reproduce
 
-    Example: groundstation reproduce air-table --out air_table
+    Example: groundstation reproduce air-table --out try/air_table
 
-    Example: groundstation reproduce air-table --out air_table --figure 16
+    Example: groundstation reproduce air-table --out try/air_table --figure 16
     """
     known = studies()
     if study is None:

@@ -14,6 +14,7 @@ import typer
 from numpy.typing import NDArray
 
 from groundstation.cli.overhead import overhead
+from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import with_progress
 from groundstation.cli.star_options import SkyOptions
 from groundstation.cli.star_pictures import PictureFolder
@@ -103,7 +104,7 @@ def solve(
     every_picture: Annotated[
         bool, typer.Option("--every-picture", help="With --pictures: all frames, not only refused ones.")
     ] = False,
-    plot: Annotated[Path | None, typer.Option(help="PNG to draw as well.")] = None,
+    plot: Plot = None,
 ) -> None:
     """Solve every frame of a folder on its own, lost in space.
 

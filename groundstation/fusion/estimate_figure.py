@@ -19,10 +19,11 @@ Array = NDArray[np.float64]
 NS = 1e9
 EDGE_SHARE = 0.15
 """Of the estimate's span, around it: fixes beyond lie at the edge."""
+HEADING = 4
 COLUMNS = (
     ("x_m", "x, m", 2),
     ("y_m", "y, m", 3),
-    ("heading_rad", "heading, rad", 4),
+    ("heading_rad", "heading, rad", HEADING),
     ("vx_m_s", "x velocity, m/s", None),
     ("vy_m_s", "y velocity, m/s", None),
     ("rate_rad_s", "rate, rad/s", None),
@@ -42,7 +43,7 @@ def draw_estimate(
         values = np.array([np.nan if state is None else getattr(state, name) for state in states])
         low, high = _span(values)
         if column is not None:
-            _draw_fixes(place, data.stars, column, values, used, (low, high))
+            _draw_fixes(place, data.stars, column, (t_s, values), used, (low, high))
         place.plot(t_s, values, "-", color="tab:blue", linewidth=1.0, label="estimate")
         place.set_ylim(low, high)
         place.set_ylabel(label)
@@ -65,16 +66,17 @@ def _draw_fixes(
     place: Any,  # noqa: ANN401 - matplotlib's axes
     stars: Array,
     column: int,
-    values: Array,
+    estimate: tuple[Array, Array],
     used: set[int],
     span: tuple[float, float],
 ) -> None:
-    """Draw the fixes; those beyond the picture lie on its edge."""
+    """Draw the fixes; those beyond the picture lie on its edge, headings are unwrapped to the estimate."""
     known = np.isfinite(stars).all(axis=1)
     exposure_s, shown = stars[known, 0], stars[known, column]
-    middle = float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
-    if column == 4:  # the heading is continuous, those of fixes are wrapped
-        shown = middle + np.angle(np.exp(1j * (shown - middle)))
+    there = np.isfinite(estimate[0]) & np.isfinite(estimate[1])
+    if column == HEADING and there.any():
+        near = np.interp(exposure_s, estimate[0][there], estimate[1][there])
+        shown = near + np.angle(np.exp(1j * (shown - near)))
     is_used = np.array([round(t * NS) in used for t in exposure_s.tolist()], dtype=np.bool_)
     shown = np.clip(shown, *span)
     place.plot(exposure_s[is_used], shown[is_used], ".", color="0.6", label="fixes used")

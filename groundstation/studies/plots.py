@@ -90,7 +90,7 @@ def over_time(
             draw(line.t_s, line.values, line.kind)
         drawn.append(panel)
         top += PANEL_HEIGHT + GAP
-    entries = dict.fromkeys((line.kind, line.words) for axes in panels for line in axes.lines)
+    entries = dict.fromkeys((line.kind, line.words) for axes in panels for line in axes.lines if line.words)
     return stacked(drawn, (), label, legend(tuple(entries), 14.0))
 
 

@@ -35,7 +35,7 @@ LAG_S = 0.6
 DRIFT_M, DRIFT_AFTER_S = 0.05, 10.0
 OFFSET_M_S2 = 0.001
 """Published: an offset error of so much drifts by 0.05 m in 10 s."""
-TURN_S = (13.0, 22.0)
+TURN_S = (10.0, 26.0)
 """The turn of figure 14."""
 
 
@@ -104,8 +104,8 @@ def draw_rate(flights: Mapping[str, Sides]) -> Drawn:
         Number("noise of a sample, deg/s (1 sigma)", NAN, math.degrees(_noise(rate[inside])), NAN,
                "published is 0.1 deg/s at 1 kHz; here ten polls are averaged, as assumed"),
     ]  # fmt: skip
-    words = "The mock-up is asked to turn by 20 degrees: one pulse begins the turn, the other ends it."
-    return Drawn([("Zero removed; asked for at 14.5 s.", picture)], numbers, words)
+    words = "The mock-up is asked to turn by 100 degrees: pulses begin the turn, others end it."
+    return Drawn([("Zero removed; asked for at 11.5 s.", picture)], numbers, words)
 
 
 def _noise(values: Array) -> float:

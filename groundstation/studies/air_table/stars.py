@@ -58,12 +58,9 @@ def draw_sky(flights: Mapping[str, Sides]) -> Drawn:
             ratio=1.005,
         ),
     ]
-    words = (
-        "The emulated ceiling hangs as the LEDs' makers would not: at random, so that fewer lie on its rim."
-    )
-    return Drawn(
-        [("The LEDs of the emulated ceiling and their triangulation, uncut.", picture)], numbers, words
-    )
+    words = "The emulated LEDs hang at random over 5 by 4 m, so that fewer of them lie on the rim."
+    caption = "The LEDs of the emulated ceiling and their triangulation, uncut."
+    return Drawn([(caption, picture)], numbers, words)
 
 
 def draw_perimeter(flights: Mapping[str, Sides]) -> Drawn:

@@ -97,9 +97,9 @@ AIR_TABLE = Study(
             (
                 *_IMU,
                 *_PULSES,
-                "a disturbance in the rest, of a size that puts the zeros off by the published values; "
-                "zeros that move ten times faster than by their data sheet; length of the first "
-                "experiment, 10 s; k(i) the nearest sample; the sign",
+                "a disturbance in the rest, of a size that puts the zeros off by the published values; a "
+                "turn of 100 degrees from 11.5 s on; length of the first experiment, 10 s; k(i) the "
+                "nearest sample; the sign",
             ),
         ),
         FigureRow(
