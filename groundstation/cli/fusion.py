@@ -64,8 +64,8 @@ def run(
             "limits; else one of them is enough.",
         ),
     ] = False,
-    gate_rest: Annotated[
-        bool, typer.Option("--gate-rest", help="Our addition to them: the rest's mean is gated, too.")
+    median_zeros: Annotated[
+        bool, typer.Option("--median-zeros", help="Our addition to them: the rest's median, not its mean.")
     ] = False,
     exact_steps: Annotated[
         bool,
@@ -106,7 +106,7 @@ def run(
         raise UsageError(f"--fit-after must be above zero, found {fit_after:g}.")
     settings = PublishedMotion(
         gate_needs_both=gate_both,
-        gates_rest=gate_rest,
+        median_zeros=median_zeros,
         takes_exact_steps=exact_steps,
         fills_gated=fill_gated,
         fit_after_s=fit_after,

@@ -35,7 +35,13 @@ from groundstation.fusion.fix_screen import complaint_about
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.packet_history import PacketHistory
 from groundstation.fusion.published_settings import AS_PUBLISHED, PublishedMotion
-from groundstation.fusion.published_steps import Moving, stepped, stepped_exactly, within_gates, zeros_of_rest
+from groundstation.fusion.published_steps import (
+    Moving,
+    median_zeros_of_rest,
+    stepped,
+    stepped_exactly,
+    zeros_of_rest,
+)
 from groundstation.fusion.star_states import StarPose, StarStates
 
 LONGEST_HOLE_S = 2.0
@@ -117,10 +123,9 @@ class PublishedEstimator:
     def _take_zeros(self, start_s: float, stop_s: float) -> None:
         rest = self._history.between(start_s, stop_s)
         readings = np.array([rest.rate_rad_s, rest.ax_m_s2, rest.ay_m_s2])
-        if self.settings.gates_rest:
-            readings = within_gates(readings)
         if readings.size:
-            self._zeros = zeros_of_rest(*readings)
+            take = median_zeros_of_rest if self.settings.median_zeros else zeros_of_rest
+            self._zeros = take(*readings)
 
     def add_imu(self, packet: ImuPacket) -> PlanarState | None:
         """Take one packet and integrate it."""

@@ -13,7 +13,7 @@ class PublishedMotion:
         start_y_m: Of them.
         start_heading_rad: Of them.
         gate_needs_both: A sample is left out only if accelerations *and* rate are beyond their limits.
-        gates_rest: Addition: samples beyond the limits, off the rest's median, are left out of the zeros.
+        median_zeros: Addition: zeros are the medians of the rest instead of the means.
         takes_exact_steps: Addition: constant acceleration over a sample, along the angle of its middle.
         fills_gated: Addition: a sample that is not used is replaced by the last used one.
         fit_after_s: Addition: so long after take-off the accelerometers' constant offsets are fitted, once.
@@ -23,7 +23,7 @@ class PublishedMotion:
     start_y_m: float = 0.0
     start_heading_rad: float = 0.0
     gate_needs_both: bool = False
-    gates_rest: bool = False
+    median_zeros: bool = False
     takes_exact_steps: bool = False
     fills_gated: bool = False
     fit_after_s: float | None = None

@@ -141,10 +141,13 @@ def _motion(bench: Bench) -> list[Row]:
         rows.append(_row(f"published joint method, {name}, wrong fixes taken out: RMS", figures.position_mm,
                          REWRITE.joint_mm[name] if is_sample else None, 0.10))  # fmt: skip
         off_mm = _imu_off_mm(folder)
-        rows.append(_row(f"published IMU alone, {name}: off after {AFTER_S:g} s", off_mm,
-                         REWRITE.imu_mm[name] if is_sample else None, 0.20))  # fmt: skip
-        rows.append(Row(f"the same, {name}, wild samples of the rest left out (ours)", "",
-                        f"{_imu_off_mm(folder, gates_rest=True):.1f} mm", None))  # fmt: skip
+        rows.append(
+            Row(f"published IMU alone, {name}: off after {AFTER_S:g} s", "", f"{off_mm:.1f} mm", None)
+        )
+        # one wild sample in the rest rules its mean; the rewrite took the median
+        reported = REWRITE.imu_mm[name] if is_sample else None
+        what = f"the same with zeros by the rest's median, {name}"
+        rows.append(_row(what, _imu_off_mm(folder, median_zeros=True), reported, 0.20))
     return rows
 
 
@@ -153,10 +156,10 @@ def _flight_below(folder: Path | None, name: str) -> Path | None:
     return next((path for path in found if (path / "truth.csv").exists()), None)
 
 
-def _imu_off_mm(folder: Path, *, gates_rest: bool = False) -> float:
+def _imu_off_mm(folder: Path, *, median_zeros: bool = False) -> float:
     """Distance from the truth 10 s after the start of the motion."""
     data = read_folder(folder)
-    settings = replace(AS_PUBLISHED, gates_rest=gates_rest)
+    settings = replace(AS_PUBLISHED, median_zeros=median_zeros)
     states, _ = estimate(data, imu_alone(data.noise, settings))
     row = int(np.searchsorted(data.imu[:, 0], data.run_start_s + AFTER_S))
     state = next(each for each in states[row:] if each is not None)

@@ -18,7 +18,7 @@ class PublishedFusionSection(Section):
     start_y_m: float = 0.0
     start_heading_deg: float = 0.0
     gate_needs_both: bool = False
-    gates_rest: bool = False
+    median_zeros: bool = False
     takes_exact_steps: bool = False
     fills_gated: bool = False
     fit_after_s: Positive | None = None

@@ -234,7 +234,7 @@ def test_what_we_added_to_the_published_methods_changes_them_only_when_asked(fol
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--gate-rest",), "go with --method reintegration, stars, imu"),
+        (("--median-zeros",), "go with --method reintegration, stars, imu"),
         (("--method", "imu", "--fit-after", "0"), "above zero"),
         (("--method", "none"), "one of filter, reintegration, stars, imu"),
     ],
