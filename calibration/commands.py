@@ -8,7 +8,7 @@ CALIBRATE = Group(
     {
         "zero-offset": Command("calibration.imu.commands:zero_offset", "IMU: offsets from a rest."),
         "zero-offset-fit": Command(
-            "calibration.imu.commands:zero_offset_fit", "IMU: offsets (mu, nu) from a stretch, as published."
+            "calibration.imu.commands:zero_offset_fit", "IMU: offsets (mu, nu) from a stretch of flight."
         ),
         "temperature": Command(
             "calibration.imu.commands:temperature", "IMU: slopes of the offsets from a rest that warms up."

@@ -25,7 +25,7 @@ def imu(
 ) -> None:
     """IMU of a running vehicle, step by step: rest, turns, flights, until there is enough data.
 
-    Example: groundstation calibrate imu examples/rigs/published.toml --guided --drive --out imu.toml
+    Example: groundstation calibrate imu examples/rigs/drawn_fixes.toml --guided --drive --out imu.toml
     """
     if not guided:
         raise UsageError(
@@ -43,6 +43,6 @@ def guided(
 ) -> None:
     """Guided calibration of a running vehicle; an installed package can add others.
 
-    Example: groundstation calibrate guided imu examples/rigs/published.toml --drive --out imu.toml
+    Example: groundstation calibrate guided imu examples/rigs/published_condition.toml --drive --out imu.toml
     """
     lead(wizard, rig, vehicle, out, is_driven=drive)

@@ -17,6 +17,7 @@ from calibration.imu import noise, procedures
 from calibration.imu import tilt as tilt_procedure
 from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
+from groundstation.cli.plot_option import Plot
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.fusion.flight_data import FlightData
@@ -26,7 +27,6 @@ Source = Annotated[
     Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv, meta.json (and stars.csv).")
 ]
 Out = Annotated[Path, typer.Option(help="TOML to write.")]
-Plot = Annotated[Path | None, typer.Option(help="PNG to draw as well.")]
 Vehicle = Annotated[str | None, typer.Option(help="Of a recording with several vehicles.")]
 
 
@@ -43,16 +43,28 @@ def zero_offset_fit(
     start_s: Annotated[float, typer.Option(help="Start of the stretch of flight.")],
     end_s: Annotated[float, typer.Option(help="End of the stretch of flight.")],
     out: Out,
+    as_published: Annotated[
+        bool,
+        typer.Option("--as-published", help="The published least squares to the letter."),
+    ] = False,
     plot: Plot = None,
     vehicle: Vehicle = None,
 ) -> None:
-    """Least squares for the accelerometers' constant offsets (mu, nu) over a stretch, as published.
+    """Least squares for the accelerometers' constant offsets (mu, nu) over a stretch of flight.
+
+    It follows the published study, where they are called alpha and beta, with additions of ours: wrong fixes
+    are left out, a packet is one of constant acceleration, and there are sigmas. --as-published is without
+    them: the printed sums, every fix, the start state known (standing, where the stretch begins in the rest);
+    its normal equations are solved with the sign that makes the squares least, the printed sign is in the
+    notes. The publication found no constant pair that fits 20 s: offsets move, and a slope looks like one
+    until the vehicle turns.
 
     Example: groundstation calibrate zero-offset-fit try/flight --start-s 20 --end-s 40 --out fit.toml
     """
     if not end_s > start_s:
         raise UsageError(f"--end-s must be after --start-s, found {start_s:g} and {end_s:g}.")
-    procedure = partial(procedures.offsets_of_stretch, start_s=start_s, end_s=end_s)
+    chosen = procedures.offsets_as_published if as_published else procedures.offsets_of_stretch
+    procedure = partial(chosen, start_s=start_s, end_s=end_s)
     _calibrate(source, vehicle, procedure, out, plot)
 
 

@@ -14,6 +14,7 @@ from calibration.imu.temperature import TemperatureSlope
 from calibration.imu.tilt_axes import TiltAxes
 from calibration.imu.zero_offset import ZeroOffset
 from groundstation.files.png import new_figure
+from groundstation.fusion.published_stretch import PublishedStretch
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,7 +139,7 @@ def draw_tilt(found: TiltAxes) -> Figure:
 
 
 def draw_offset_fit(residual_m: Array) -> Figure:
-    """Draw how far the integrated way of the published fit misses the fixes, (2, m)."""
+    """Draw how far the integrated way of the fit misses the fixes, (2, m)."""
     figure = new_figure(8.0, 5.0)
     number = np.arange(2, residual_m.shape[1] + 2)
     for k, axes in enumerate(_axes(figure, 2)):
@@ -147,4 +148,25 @@ def draw_offset_fit(residual_m: Array) -> Figure:
         axes.set_ylabel(f"fix less integration, {'xy'[k]}, mm")
         axes.grid(alpha=0.3)
     axes.set_xlabel("fix of the stretch")
+    return figure
+
+
+def draw_published_offsets(found: PublishedStretch) -> Figure:
+    """Draw the integrated way with and without the offsets, the fixes, and what is left at each fix."""
+    figure = new_figure(9.0, 8.0)
+    axes = figure.subplots(3, 1, sharex=True)
+    fit = found.fit
+    after = found.way.at(fit.alpha_m_s2, fit.beta_m_s2)
+    for row, (place, label) in enumerate(zip(axes, ("x, m", "y, m"), strict=False)):
+        place.plot(found.fix_s, found.star_m[row], ".", color="0.4", label="fixes")
+        place.plot(found.end_s, found.way.f_m[row], "--", color="tab:red", label="zeros of the rest")
+        place.plot(found.end_s, after[row], "-", color="tab:blue", label="and fitted offsets")
+        place.set_ylabel(label)
+    axes[0].legend(loc="best", fontsize=8)
+    for row, label in enumerate(("x", "y")):
+        axes[2].plot(found.fix_s, 1e3 * fit.residual_m[row], ".-", label=label)
+    axes[2].axhline(0.0, color="0.7")
+    axes[2].set_ylabel("way - fixes, mm")
+    axes[2].set_xlabel("time, s")
+    axes[2].legend(loc="best", fontsize=8)
     return figure

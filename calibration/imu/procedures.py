@@ -16,6 +16,7 @@ from calibration.imu.zero_offset import Disturbance, ZeroOffset, zero_offset
 from calibration.outcome import CalibrationRefusedError, Note, Outcome
 from calibration.result import Quantity
 from groundstation.fusion.flight_data import Array, FlightData
+from groundstation.fusion.published_stretch import fit_published_stretch
 from groundstation.fusion.stretch import fit_stretch
 
 LEAST_REST_S = 1.0
@@ -56,7 +57,7 @@ def offsets_at_rest(data: FlightData) -> Outcome:
 
 
 def offsets_of_stretch(data: FlightData, start_s: float, end_s: float) -> Outcome:
-    """Fit the constant offsets (mu, nu) of the accelerometers over a stretch of flight, as published.
+    """Fit the constant offsets (mu, nu) of the accelerometers over a stretch of flight, wrong fixes left out.
 
     Raises:
         CalibrationRefusedError: There is too little in the stretch.
@@ -78,6 +79,42 @@ def offsets_of_stretch(data: FlightData, start_s: float, end_s: float) -> Outcom
         {"position": Quantity(fit.residual_rms_m, math.nan, "m")},
         {"start_s": start_s, "end_s": end_s, "fixes": fit.fixes, "fixes_refused": refused},
         partial(figures.draw_offset_fit, fit.residual_m),
+    )
+
+
+def offsets_as_published(data: FlightData, start_s: float, end_s: float) -> Outcome:
+    """Fit the constant offsets of the accelerometers as published, where they are called alpha and beta.
+
+    What is given is to be taken from the readings: the zeros of the rest, and what the fit finds beyond them.
+
+    Raises:
+        CalibrationRefusedError: There is too little in the stretch.
+    """
+    try:
+        found = fit_published_stretch(data, start_s, end_s)
+    except ValueError as error:
+        raise CalibrationRefusedError(f"from {start_s:g} to {end_s:g} s: {error}") from error
+    fit = found.fit
+    return _outcome(
+        "Zero offsets (alpha, beta) by the published least squares over a stretch of flight",
+        {
+            "mu": Quantity(found.zeros[1] + fit.alpha_m_s2, math.nan, "m/s^2"),
+            "nu": Quantity(found.zeros[2] + fit.beta_m_s2, math.nan, "m/s^2"),
+        },
+        {
+            "position": Quantity(fit.residual_rms_m, math.nan, "m"),
+            "position_before": Quantity(fit.before_rms_m, math.nan, "m"),
+        },
+        {
+            "start_s": start_s,
+            "end_s": end_s,
+            "fixes": len(found.fix_s),
+            "alpha_beyond_rest_m_s2": fit.alpha_m_s2,
+            "beta_beyond_rest_m_s2": fit.beta_m_s2,
+            "alpha_with_printed_sign_m_s2": fit.printed[0],
+            "beta_with_printed_sign_m_s2": fit.printed[1],
+        },
+        partial(figures.draw_published_offsets, found),
     )
 
 

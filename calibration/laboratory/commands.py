@@ -14,6 +14,7 @@ from calibration.laboratory.findings import Findings, sentence
 from calibration.laboratory.procedure import fit_laboratory
 from calibration.laboratory.written import laboratory_json, laboratory_toml
 from calibration.result import provenance_of
+from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import png_of
@@ -23,7 +24,7 @@ from groundstation.files.writing import Content, check_targets, write_files
 def laboratory(
     source: Annotated[Path, typer.Argument(help="Recording (.mcap) of a flight to and fro.")],
     out: Annotated[Path, typer.Option(help="TOML to write; numbers go beside it as .json.")],
-    plot: Annotated[Path | None, typer.Option(help="PNG to draw as well.")] = None,
+    plot: Plot = None,
     vehicle: Annotated[str | None, typer.Option(help="Only this vehicle of the recording.")] = None,
     rig: Annotated[Path | None, typer.Option(help="Rig file instead of the recorded one.")] = None,
 ) -> None:

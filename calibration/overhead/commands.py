@@ -13,6 +13,7 @@ from calibration.overhead.board_views import read_board_views
 from calibration.overhead.procedure import pose_by_board
 from calibration.result import provenance_of
 from calibration.sky.pictures import printed_board
+from groundstation.cli.plot_option import Plot
 from groundstation.files.writing import check_targets
 
 
@@ -24,7 +25,7 @@ def overhead(
     square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1)] = 150.0,
     marker_mm: Annotated[float, typer.Option(help="Edge of a marker.", min=0.1)] = 110.0,
     thickness_mm: Annotated[float, typer.Option(help="Of the board.", min=0.0)] = 0.0,
-    plot: Annotated[Path | None, typer.Option(help="Residual plot to write (PNG).")] = None,
+    plot: Plot = None,
     tape_mm: Annotated[float, typer.Option(help="How well places were measured.", min=0.01)] = 2.0,
     tape_deg: Annotated[float, typer.Option(help="How well headings were.", min=1e-3)] = 0.2,
 ) -> None:

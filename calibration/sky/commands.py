@@ -18,6 +18,7 @@ from calibration.sky.pictures import find_spots, printed_board, read_sky_picture
 from calibration.sky.survey.anchors import read_anchors
 from calibration.sky.survey.sweep import survey_sweep
 from calibration.sky.turns import read_turns
+from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.star_folder import find_frames
 from groundstation.declarations.errors import UsageError
@@ -27,7 +28,6 @@ from groundstation.star_tracking.camera_model import CameraCalibration
 Folder = Annotated[Path, typer.Argument(help="With camera.json, ceiling.csv and frames/.")]
 Out = Annotated[Path, typer.Option(help="Result with provenance to write (TOML).")]
 CameraOut = Annotated[Path | None, typer.Option(help="camera.json to write with the new values.")]
-Plot = Annotated[Path | None, typer.Option(help="Residual plot to write (PNG).")]
 
 
 def lens(
@@ -155,7 +155,7 @@ def survey(
     camera_out: Annotated[
         Path | None, typer.Option(help="camera.json to write with the ceiling's height as found.")
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Map and residual plot to write (PNG).")] = None,
+    plot: Plot = None,
     verify_every: Annotated[
         int, typer.Option(help="First without every so many pictures, to verify; 0: never.", min=0)
     ] = 6,

@@ -14,6 +14,7 @@ from calibration.delivery import refusing
 from calibration.table.figures import draw_map
 from calibration.table.procedure import SHORTEST_WAVE_M, check_on, map_of_sources, summary_of
 from calibration.table.smoothed_flights import Bounds, read_source
+from groundstation.cli.plot_option import Plot
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import png_of
 from groundstation.files.writing import check_targets, write_files
@@ -23,7 +24,7 @@ from groundstation.fusion.levelling import levelling
 def table_map(
     flights: Annotated[list[Path], typer.Argument(help="Recordings (.mcap) or folders with imu.csv, ...")],
     out: Annotated[Path, typer.Option(help="TOML to write; the grid goes beside it as .npz.")],
-    plot: Annotated[Path | None, typer.Option(help="PNG to draw as well.")] = None,
+    plot: Plot = None,
     leg: Annotated[
         list[str] | None,
         typer.Option(help="A leg of the table, NAME:X,Y in m; three or more. Else those of the rig."),

@@ -11,16 +11,20 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
-from groundstation.files.writing import check_targets, write_files
+from groundstation.files.png import png_of
+from groundstation.files.writing import Content, check_targets, write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
+from groundstation.fusion.estimate_figure import draw_estimate
 from groundstation.fusion.estimator import Estimator, FixOutcome, PlanarState
-from groundstation.fusion.estimators import ESTIMATORS
+from groundstation.fusion.estimators import ESTIMATORS, PUBLISHED
 from groundstation.fusion.flight_data import FlightData, estimate, lost_spans
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.offline import OfflineSmoother
+from groundstation.fusion.published_settings import AS_PUBLISHED, PublishedMotion
 from groundstation.fusion.slope_grid import noise_with, slope_grid
 from groundstation.fusion.table_map import TableMap
 
@@ -52,10 +56,41 @@ def run(
         Path | None, typer.Option(help="Map of the table's slope, made by `calibrate table-map`.")
     ] = None,
     smooth: Annotated[bool, typer.Option("--smooth", help="Look ahead as well: for recordings.")] = False,
+    gate_both: Annotated[
+        bool,
+        typer.Option(
+            "--gate-both",
+            help="Published methods: a sample is left out only if accelerations and rate are beyond their "
+            "limits; else one of them is enough.",
+        ),
+    ] = False,
+    median_zeros: Annotated[
+        bool, typer.Option("--median-zeros", help="Our addition to them: the rest's median, not its mean.")
+    ] = False,
+    exact_steps: Annotated[
+        bool,
+        typer.Option("--exact-steps", help="Our addition to them: a/2 d^2 instead of the printed 3/2 a d^2."),
+    ] = False,
+    fill_gated: Annotated[
+        bool,
+        typer.Option(
+            "--fill-gated", help="Our addition to them: the last good sample for one that is left out."
+        ),
+    ] = False,
+    fit_after: Annotated[
+        float | None,
+        typer.Option(help="Our addition to them: constant offsets fitted in the loop after so many seconds."),
+    ] = None,
+    plot: Plot = None,
 ) -> None:
     """Estimate the motion in a data set; causal, as if it were live, unless --smooth.
 
+    reintegration, stars and imu are the published methods as published: means of the rest as zeros, the
+    printed integration, from each late fix the stored samples again; no test of fixes, no offsets fitted.
+
     Example: groundstation fusion run try/flight --out estimate.csv
+
+    Example: groundstation fusion run try/flight --out estimate.csv --method imu --plot estimate.png
     """
     if out.name == "fixes.csv":
         raise UsageError("--out must not be called fixes.csv: the account of the fixes goes there.")
@@ -67,32 +102,48 @@ def run(
         raise UsageError(f"--smooth works on the filter, not on --method {method}.")
     if table_map is not None and method != "filter":
         raise UsageError(f"--table-map works on the filter, not on --method {method}.")
-    check_targets(out, out.with_name("fixes.csv"))
+    if fit_after is not None and not 0.0 < fit_after < math.inf:
+        raise UsageError(f"--fit-after must be above zero, found {fit_after:g}.")
+    settings = PublishedMotion(
+        gate_needs_both=gate_both,
+        median_zeros=median_zeros,
+        takes_exact_steps=exact_steps,
+        fills_gated=fill_gated,
+        fit_after_s=fit_after,
+    )
+    if settings != AS_PUBLISHED and method not in PUBLISHED:
+        raise UsageError(f"options of the published methods go with --method {', '.join(PUBLISHED)}.")
+    check_targets(out, out.with_name("fixes.csv"), plot)
     data = read_folder(folder)
-    estimator = _estimator(data.noise, method, table_map, smooth=smooth)
+    estimator = _estimator(data.noise, method, settings, table_map, smooth=smooth)
     with progress_line() as progress:
         states, accounts = estimate(data, estimator, partial(progress, "estimating"))
     if isinstance(estimator, OfflineSmoother):
         later = iter(estimator.states())
         states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0].tolist()]
-    write_files(
-        {
-            out: _estimate_lines(data, states),
-            out.with_name("fixes.csv"): _fix_lines(accounts),
-        }
-    )
+    contents: dict[Path, Content] = {
+        out: _estimate_lines(data, states),
+        out.with_name("fixes.csv"): _fix_lines(accounts),
+    }
+    if plot is not None:
+        contents[plot] = png_of(draw_estimate(data, states, accounts))
+    write_files(contents)
     for note in data.notes:
         sys.stderr.write(f"{note}.\n")
     _summarise(data, states, accounts, estimator)
 
 
-def _estimator(noise: NoiseModel, method: str, table_map: Path | None, *, smooth: bool) -> Estimator:
+def _estimator(
+    noise: NoiseModel, method: str, settings: PublishedMotion, table_map: Path | None, *, smooth: bool
+) -> Estimator:
     known = None
     if table_map is not None:
         known = slope_grid(TableMap.load(table_map))
         noise = noise_with(noise, known)
     if smooth:
         return OfflineSmoother(noise, known)
+    if method in PUBLISHED:
+        return PUBLISHED[method](noise, settings)
     return ErrorStateFilter(noise, table_map=known) if known else ESTIMATORS[method](noise)
 
 

@@ -33,6 +33,7 @@ COMMANDS: dict[str, Row] = {
     "demo": Command("groundstation.cli.demo:app", "Make small data sets of every kind to try commands on."),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
+    "reproduce": Command("groundstation.cli.reproduce:app", "Run published experiments again."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
 }
 ALIASES = {

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from groundstation.bus.envelope import Cause
-from groundstation.cli import recording_pictures
+from groundstation.cli import recording_export, recording_pictures
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.causes import CauseIndex
 from groundstation.recording.errors import RecordingError
@@ -21,6 +21,7 @@ from groundstation.recording.writer import PART_SUFFIX
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.command()(recording_pictures.pictures)
+app.command()(recording_export.export)
 
 
 @app.callback()

@@ -67,7 +67,7 @@ def run(
 
     Example: groundstation run examples/scenarios/go_to.toml --lockstep --report report
 
-    Example: groundstation run examples/rigs/published.toml --lockstep --duration 120 --report report
+    Example: groundstation run examples/rigs/drawn_fixes.toml --lockstep --duration 120 --report report
     """
     if compare is not None:
         if report is None:

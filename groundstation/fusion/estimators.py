@@ -7,11 +7,10 @@ from types import MappingProxyType
 
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import EstimatorFactory
-from groundstation.fusion.reintegration import ReintegrationEstimator
+from groundstation.fusion.published_motion import PublishedFactory, imu_alone, joint, stars_alone
 
-ESTIMATORS: Mapping[str, EstimatorFactory] = MappingProxyType(
-    {
-        "filter": ErrorStateFilter,
-        "reintegration": ReintegrationEstimator,
-    }
+PUBLISHED: Mapping[str, PublishedFactory] = MappingProxyType(
+    {"reintegration": joint, "stars": stars_alone, "imu": imu_alone}
 )
+"""Those as they are published; they take settings."""
+ESTIMATORS: Mapping[str, EstimatorFactory] = MappingProxyType({"filter": ErrorStateFilter, **PUBLISHED})

@@ -20,6 +20,7 @@ NS = 1e9
 PROGRESS_PACKETS = 20000
 PAUSE_S = 60.0
 """Nobody watched for longer than that: a rest is over, and another one may follow."""
+REFERENCE_COLUMNS = 7
 FIX_ROWS = 5
 """Before and after, by which it is judged whether the fixes' clock was set back, too."""
 EARLY_S = 1e-3
@@ -37,7 +38,8 @@ class FlightData:
         covariance: (m, 3, 3) of each fix.
         run_start_s: Until then the vehicle stands still.
         noise: Of sensors and fixes.
-        reference: (k, 4) s, x, y, heading by motion capture or an emulator; for judging results only.
+        reference: (k, 7) s, x, y, heading, velocity x, y, turn rate by motion capture or an emulator; for
+            judging results only.
         stamp_delay_s: What was taken off the arrivals to give the exposures.
         given_s: (n,) the stamps as they were given; None before the screen.
         odd: How many packets were set aside, by reason, and how often the clock was set back.
@@ -49,7 +51,7 @@ class FlightData:
     covariance: Array
     run_start_s: float
     noise: NoiseModel
-    reference: Array = field(default_factory=lambda: np.empty((0, 4)))
+    reference: Array = field(default_factory=lambda: np.empty((0, REFERENCE_COLUMNS)))
     stamp_delay_s: float = 0.0
     given_s: Array | None = None
     odd: Mapping[str, int] = field(default_factory=dict)

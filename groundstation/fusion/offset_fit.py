@@ -1,4 +1,8 @@
-"""The published least squares for the accelerometers' constant offsets (mu, nu) over a stretch of flight."""
+"""Least squares for the accelerometers' constant offsets (mu, nu) over a stretch of flight.
+
+After the published one (`published_offset_fit`, to the letter), with additions of ours: constant acceleration
+over a packet, the start velocity corrected by the travel of its interval, and a covariance.
+"""
 
 from __future__ import annotations
 

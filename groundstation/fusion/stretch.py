@@ -1,4 +1,4 @@
-"""A stretch of flight prepared for the published offset fit: heading integrated, wrong fixes left out."""
+"""A stretch of flight prepared for the offset fit: heading integrated, wrong fixes left out."""
 
 from __future__ import annotations
 

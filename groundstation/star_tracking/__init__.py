@@ -13,7 +13,9 @@ Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O,
 ``rays``            pixel -> point of the ceiling plane relative to the body (full camera model)
 ``sky_index``       catalogue -> tables for constant-time look-ups of stars, triangles and pairs
 ``tracker``         spots -> ``StarFix`` or ``NoFix``, lost in space or from a prior
-``published``       the published Delaunay method, for comparison
+``published``       the published Delaunay identification, for comparison
+``published_image`` the published steps from a picture to star centres, for comparison
+``identifications`` THE TABLE of ways from a picture to a fix that a rig or a command names
 ==================  ====================================================================================
 
 Frames: pixel (u right, v down, (0, 0) the centre of the top-left pixel), ``body``, ``table``; ceiling

@@ -1,32 +1,43 @@
-"""The published star identification, kept runnable for comparison.
+"""The published star identification, kept runnable as it is published, for comparison.
 
-Spots and catalogue are triangulated (Delaunay); triangles whose smallest and largest interior angles
-agree are matched vertex by vertex, which gives an affine map each; maps that are nearly similarities
-place the centre of the picture on the ceiling; the largest cluster of these places is the answer and
-its median the fix. No camera calibration enters the identification. Thin triangles are left out.
+As published: stars of the catalogue and centres of the picture are triangulated (Delaunay, all triangles);
+a triangle of the picture is compared with every one of the catalogue and matches where both its smallest and
+its largest interior angle differ by less than a limit; each match gives the affine map from pixels to the
+table that fits its vertices by least squares; each map places the centre of the picture; of the sorted places
+the longest run of mutually close ones, two at least, gives its mean as the answer; otherwise there is none.
 
-The triangulation costs O(n log n) and the look-up O(log n) per triangle by a KD-tree over the angles,
-where the publication scanned the catalogue.
+Not published, so assumed: the two limits; vertices are paired by angle; close means both coordinates within
+the limit, for each pair of the run; the heading is the mean turn of the run's maps; the pose of the body
+follows by the camera's known mount. With three vertices the least squares fits exactly; mirrored maps count.
+
+What `PublishedSettings` calls an addition is ours.
 """
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import QhullError, cKDTree
 
 from groundstation.star_tracking.camera_model import CameraCalibration
+from groundstation.star_tracking.close_run import longest_run
+from groundstation.star_tracking.delaunay import triangles_of
 from groundstation.star_tracking.detection import Spots
-from groundstation.star_tracking.fixes import Mode, NoFix, PictureFix, Refusal
+from groundstation.star_tracking.fixes import BodyMotion, Mode, NoFix, PictureFix, PosePrior, Refusal
+from groundstation.star_tracking.published_settings import AS_PUBLISHED, PublishedSettings
 from groundstation.star_tracking.rays import ceiling_points
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-ANGLE_TOLERANCE_RAD = np.deg2rad(1.2)
-LARGEST_ANGLE_RAD = np.deg2rad(150.0)  # thinner triangles of the hull tell nothing
-SIMILARITY_RATIO = 1.1  # of the singular values of a map that still counts as a similarity
-CLUSTER_RADIUS_M = 0.05
-MIN_CLUSTER = 3
-_MAX_MATCHES = 20_000
+LEAST_RUN = 2
+"""Published: places that must be close to each other."""
+LEAST_SPOTS = 3
+SIMILARITY_RATIO = 1.1
+"""Of the singular values of a map that still counts as a similarity; an addition."""
+THIN_RAD = float(np.deg2rad(150.0))
+"""Largest angle of a triangle that counts as thin; an addition."""
+_MOST_MATCHES = 20_000
+"""Bounds the time that a picture of thousands of lights takes; an addition that no ceiling comes near."""
 
 
 class PublishedTracker:
@@ -35,76 +46,106 @@ class PublishedTracker:
     Args:
         catalogue: The stars.
         camera: Only its mount is used, to carry the centre of the picture to the body origin.
+        settings: Limits and additions.
+
+    Raises:
+        ValueError: The catalogue has fewer than three stars, or all on one line.
     """
 
-    def __init__(self, catalogue: StarCatalogue, camera: CameraCalibration) -> None:
+    def __init__(
+        self,
+        catalogue: StarCatalogue,
+        camera: CameraCalibration,
+        settings: PublishedSettings = AS_PUBLISHED,
+    ) -> None:
+        self._settings = settings
         self._star_m = np.stack((catalogue.x_m, catalogue.y_m), axis=1)
-        self._triangles, angles = _triangulate(self._star_m)
-        self._tree = cKDTree(angles)
-        self._centre_px = np.array([[0.5 * (camera.width - 1), 0.5 * (camera.height - 1)]])
-        q, jacobian = ceiling_points(camera, self._centre_px[:, 0], self._centre_px[:, 1])
+        try:
+            self._triangles, self._angles = self._triangulate(self._star_m)
+        except QhullError as error:
+            raise ValueError("the catalogue has no triangle: three stars off one line are needed") from error
+        self._tree = cKDTree(self._angles) if settings.uses_tree else None
+        self._centre_px = np.array([0.5 * (camera.width - 1), 0.5 * (camera.height - 1)])
+        q, jacobian = ceiling_points(camera, self._centre_px[:1], self._centre_px[1:])
         self._q_centre_m = complex(q[0, 0], q[0, 1])
         # Image axes turned against the body's by the mount, as seen on the ceiling.
         self._image_turn_rad = float(np.angle(complex(jacobian[0, 0, 0], jacobian[0, 1, 0])))
 
-    def solve(self, spots: Spots) -> PictureFix | NoFix:
-        """Give the pose at the exposure, or say why there is none."""
+    @property
+    def triangles(self) -> int:
+        """How many triangles the catalogue has."""
+        return len(self._triangles)
+
+    def solve(
+        self, spots: Spots, prior: PosePrior | None = None, motion: BodyMotion | None = None
+    ) -> PictureFix | NoFix:
+        """Give the pose at the exposure, or say why there is none.
+
+        Args:
+            spots: Of one picture.
+            prior: Not used: the method is lost in space.
+            motion: Not used.
+        """
+        del prior, motion
         n = len(spots)
-        if n < MIN_CLUSTER + 1:
-            return NoFix(Refusal.TOO_FEW_STARS, f"{n} spots, a triangulation needs {MIN_CLUSTER + 1}.", n)
+        if n < LEAST_SPOTS:
+            return NoFix(Refusal.TOO_FEW_STARS, f"{n} spots, a triangle needs {LEAST_SPOTS}.", n)
         spot_px = np.stack((spots.u_px, spots.v_px), axis=1)
         try:
-            triangles, angles = _triangulate(spot_px)
+            triangles, angles = self._triangulate(spot_px)
         except QhullError:
             return NoFix(Refusal.TOO_FEW_STARS, "The spots lie on one line.", n)
-        found = self._lookalikes(angles)
-        query = np.repeat(np.arange(len(angles)), [len(f) for f in found])[:_MAX_MATCHES]
-        if len(query) == 0:
+        seen, known = self._matches(angles)
+        if len(seen) == 0:
             return NoFix(Refusal.NO_CONSENSUS, "No triangle resembles one of the catalogue.", n)
-        entry = np.concatenate([np.asarray(f, dtype=np.int64) for f in found])[:_MAX_MATCHES]
-        spot, star = triangles[query], self._triangles[entry]
-        matrix, shift = _affine_maps(spot_px[spot], self._star_m[star])
-        similar = _is_similarity(matrix)
-        matrix, shift, spot, star = matrix[similar], shift[similar], spot[similar], star[similar]
-        centre = matrix @ self._centre_px[0] + shift
-        member = _largest_cluster(centre)
-        if len(member) < MIN_CLUSTER:
-            return NoFix(
-                Refusal.NO_CONSENSUS, f"The largest cluster has {len(member)} maps, not {MIN_CLUSTER}.", n
+        spot, star = triangles[seen], self._triangles[known]
+        matrix, shift = affine_maps(spot_px[spot], self._star_m[star])
+        if self._settings.only_similar:
+            similar = is_similarity(matrix)
+            matrix, shift, spot, star = matrix[similar], shift[similar], spot[similar], star[similar]
+        place = matrix @ self._centre_px + shift
+        run = longest_run(place, self._settings.closeness_m)
+        if len(run) < LEAST_RUN:
+            return NoFix(Refusal.NO_CONSENSUS, f"No two of {len(place)} places are close to each other.", n)
+        return self._fix(matrix[run], place[run], spot[run].ravel(), star[run].ravel())
+
+    def _triangulate(self, points: Array) -> tuple[Indices, Array]:
+        triangles, angles = triangles_of(points)
+        if self._settings.drops_thin:
+            fat = angles[:, 1] < THIN_RAD
+            return triangles[fat], angles[fat]
+        return triangles, angles
+
+    def _matches(self, angles: Array) -> tuple[Indices, Indices]:
+        """Give pairs of a triangle of the picture and one of the catalogue whose angles agree."""
+        limit = self._settings.angle_limit_rad
+        if self._tree is None:
+            seen, known = alike(angles, self._angles, limit)
+        else:
+            found = self._tree.query_ball_point(
+                angles, np.nextafter(limit, 0.0), p=np.inf, return_sorted=True
             )
-        return self._fix(matrix[member], centre[member], spot[member].ravel(), star[member].ravel())
+            lists = [np.asarray(each, dtype=np.int64) for each in np.asarray(found, dtype=object)]
+            seen = np.repeat(np.arange(len(angles)), [len(each) for each in lists])
+            known = np.concatenate([np.zeros(0, np.int64), *lists])
+        return seen[:_MOST_MATCHES].astype(np.int64), known[:_MOST_MATCHES].astype(np.int64)
 
-    def _lookalikes(self, angles: Array) -> list[list[int]]:
-        """Give, for every triangle of spots, the catalogue's triangles of like angles."""
-        if len(angles) == 0:
-            return []
-        found = self._tree.query_ball_point(angles, ANGLE_TOLERANCE_RAD, p=np.inf)
-        return [list(each) for each in np.asarray(found, dtype=object)]
-
-    def _fix(
-        self, matrix: Array, centre: Array, spot: NDArray[np.int64], star: NDArray[np.int64]
-    ) -> PictureFix:
-        place = np.median(centre, axis=0)
+    def _fix(self, matrix: Array, place: Array, spot: Indices, star: Indices) -> PictureFix:
         turns = (matrix[:, 0, 0] + matrix[:, 1, 1]) + 1j * (matrix[:, 1, 0] - matrix[:, 0, 1])
-        middle = complex(np.sum(turns / np.abs(turns)))
+        turns = turns / np.maximum(np.abs(turns), np.finfo(float).tiny)
+        middle = complex(np.sum(turns))
         offsets = np.angle(turns * np.conj(middle))
-        heading = float(np.angle(middle)) + float(np.median(offsets)) - self._image_turn_rad
-        turn = np.exp(1j * heading)
-        origin = complex(place[0], place[1]) - turn * self._q_centre_m
-        # The publication gives no covariance. Maps that share stars err alike: their scatter is divided by
-        # the stars' number; that of a few maps tells little, so it is mixed with what the method lets pass.
-        maps, stars = len(centre), len(np.unique(star))
-        mixed = (maps - 1 + MIN_CLUSTER) * stars
-        passed_m2 = (0.25 * CLUSTER_RADIUS_M) ** 2
-        covariance = np.zeros((3, 3))
-        covariance[:2, :2] = ((maps - 1) * np.cov(centre.T) + MIN_CLUSTER * passed_m2 * np.eye(2)) / mixed
-        covariance[2, 2] = float(offsets @ offsets + MIN_CLUSTER * (0.5 * ANGLE_TOLERANCE_RAD) ** 2) / mixed
+        where, turned = place.mean(axis=0), float(np.angle(middle))
+        if self._settings.takes_median:
+            where, turned = np.median(place, axis=0), turned + float(np.median(offsets))
+        turn = np.exp(1j * (turned - self._image_turn_rad))
+        origin = complex(where[0], where[1]) - turn * self._q_centre_m
         star, first = np.unique(star, return_index=True)
         return PictureFix(
             x_m=float(origin.real),
             y_m=float(origin.imag),
             heading_rad=float(np.angle(turn)),
-            covariance=covariance,
+            covariance=self._covariance(place, offsets, len(star)),
             stars=len(star),
             mode=Mode.PUBLISHED,
             spot_index=spot[first],
@@ -113,31 +154,53 @@ class PublishedTracker:
             evidence_nats=float("nan"),
         )
 
+    def _covariance(self, place: Array, offsets_rad: Array, stars: int) -> Array:
+        """Guess what the publication does not give, from the scatter of the run.
 
-def _triangulate(point: Array) -> tuple[NDArray[np.int64], Array]:
-    """Give triangles (t, 3), vertices by rising interior angle, and (smallest, largest) angle (t, 2)."""
-    triangles = Delaunay(point).simplices.astype(np.int64)
-    corner = point[triangles]
-    one = np.roll(corner, -1, axis=1) - corner
-    two = np.roll(corner, 1, axis=1) - corner
-    cross = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
-    angle = np.arctan2(np.abs(cross), (one * two).sum(axis=2))
-    order = np.argsort(angle, axis=1)
-    angle = np.take_along_axis(angle, order, axis=1)
-    fat = angle[:, 2] < LARGEST_ANGLE_RAD
-    return np.take_along_axis(triangles, order, axis=1)[fat], angle[fat][:, [0, 2]]
-
-
-def _affine_maps(spot_px: Array, star_m: Array) -> tuple[Array, Array]:
-    """Give the maps star = matrix spot + shift of triangles (t, 3, 2): (t, 2, 2) and (t, 2)."""
-    spot_arms = (spot_px[:, 1:] - spot_px[:, :1]).transpose(0, 2, 1)
-    star_arms = (star_m[:, 1:] - star_m[:, :1]).transpose(0, 2, 1)
-    matrix = star_arms @ np.linalg.inv(spot_arms)
-    shift = star_m[:, 0] - np.einsum("tij,tj->ti", matrix, spot_px[:, 0])
-    return matrix, shift
+        Maps that share stars err alike: their scatter is divided by the stars' number; that of a few maps
+        tells little, so it is mixed with what the method lets pass.
+        """
+        maps = len(place)
+        mixed = (maps - 1 + LEAST_RUN) * stars
+        passed_m2 = (0.25 * self._settings.closeness_m) ** 2
+        passed_rad2 = (0.5 * self._settings.angle_limit_rad) ** 2
+        covariance = np.zeros((3, 3))
+        covariance[:2, :2] = ((maps - 1) * np.cov(place.T) + LEAST_RUN * passed_m2 * np.eye(2)) / mixed
+        covariance[2, 2] = float(offsets_rad @ offsets_rad + LEAST_RUN * passed_rad2) / mixed
+        return covariance
 
 
-def _is_similarity(matrix: Array) -> NDArray[np.bool_]:
+def alike(angles: Array, known: Array, limit_rad: float) -> tuple[Indices, Indices]:
+    """Compare each triangle with every known one, by (smallest, largest) interior angle.
+
+    Args:
+        angles: Of the picture's triangles, shape (n, 2), rad.
+        known: Of the catalogue's, shape (m, 2), rad.
+        limit_rad: Both angles must differ by less.
+
+    Returns:
+        Rows of both, a pair for each match.
+    """
+    seen, found = np.nonzero((np.abs(angles[:, None] - known[None]) < limit_rad).all(axis=2))
+    return seen, found
+
+
+def affine_maps(spot_px: Array, star_m: Array) -> tuple[Array, Array]:
+    """Give the affine maps star = matrix spot + shift that fit vertices best, by least squares.
+
+    Args:
+        spot_px: Vertices in the picture, shape (t, k, 2), k of three or more.
+        star_m: The same on the table, shape (t, k, 2).
+
+    Returns:
+        Matrices (t, 2, 2) and shifts (t, 2).
+    """
+    design = np.concatenate((spot_px, np.ones((*spot_px.shape[:2], 1))), axis=2)
+    solved = np.linalg.pinv(design) @ star_m  # rows: what u, v and 1 contribute to x, y
+    return np.ascontiguousarray(solved[:, :2].transpose(0, 2, 1)), np.ascontiguousarray(solved[:, 2])
+
+
+def is_similarity(matrix: Array) -> NDArray[np.bool_]:
     """Tell maps without mirror and with nearly equal singular values."""
     determinant = matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] * matrix[:, 1, 0]
     norm2 = (matrix**2).sum(axis=(1, 2))
@@ -145,12 +208,3 @@ def _is_similarity(matrix: Array) -> NDArray[np.bool_]:
     limit = SIMILARITY_RATIO + 1.0 / SIMILARITY_RATIO
     similar: NDArray[np.bool_] = (determinant > 0.0) & (norm2 <= limit * determinant)
     return similar
-
-
-def _largest_cluster(centre_m: Array) -> NDArray[np.int64]:
-    if len(centre_m) == 0:
-        return np.zeros(0, np.int64)
-    tree = cKDTree(centre_m)
-    sizes = np.asarray(tree.query_ball_point(centre_m, CLUSTER_RADIUS_M, return_length=True))
-    seed = int(np.argmax(sizes))
-    return np.asarray(tree.query_ball_point(centre_m[seed], CLUSTER_RADIUS_M), dtype=np.int64)

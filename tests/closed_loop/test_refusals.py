@@ -18,7 +18,7 @@ from groundstation.rig.read import parse_rig
 from groundstation.runners.replay import ReplayRunner
 from groundstation.watch.monitor import Monitor
 
-RIG = Path(__file__).parents[2] / "examples" / "rigs" / "published.toml"
+RIG = Path(__file__).parents[2] / "examples" / "rigs" / "published_condition.toml"
 MORE = """
 [mock_ups.standard.fusion]
 rest_s = 1.0

@@ -23,7 +23,7 @@ def test_drawn_fixes_of_the_published_condition_hold_the_station(fly, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("rig", "limit_m", "limit_deg"), [("published", 0.010, 0.5), ("datasheet", 0.015, 1.0)]
+    ("rig", "limit_m", "limit_deg"), [("published_condition", 0.010, 0.5), ("datasheet", 0.015, 1.0)]
 )
 def test_rendered_stars_and_a_busy_tracker_hold_the_station(fly, rig, limit_m, limit_deg):
     distance_m, turn_rad = off_goal(fly, rig, 21)

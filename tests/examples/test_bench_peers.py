@@ -9,7 +9,7 @@ import pytest
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.fusion.estimator import PlanarState
 from groundstation.fusion.noise import NoiseModel
-from groundstation.fusion.reintegration import ReintegrationEstimator
+from groundstation.fusion.published_motion import joint
 
 STEP = 1e-6
 
@@ -147,8 +147,8 @@ def test_the_truth_judged_by_itself_has_no_error(bench, flight):
 
 def test_wrong_fixes_are_taken_out_for_the_published_method_and_it_flies_better(bench, flight):
     flown = bench("fusion.score").flown
-    spoilt = flown(flight, ReintegrationEstimator)
-    cleaned = flown(flight, ReintegrationEstimator, is_cleaned=True)
+    spoilt = flown(flight, joint)
+    cleaned = flown(flight, joint, is_cleaned=True)
     assert spoilt.wrong > cleaned.wrong == 0
     assert cleaned.position_mm < spoilt.position_mm
 

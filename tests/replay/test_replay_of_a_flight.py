@@ -54,7 +54,7 @@ def test_every_node_of_a_flight_is_replayed_bit_for_bit(flown):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rig_name", ["published", "late_pipeline"])
+@pytest.mark.parametrize("rig_name", ["published", "published_condition", "late_pipeline"])
 def test_a_flight_by_rendered_stars_is_equal_twice_and_replayed_bit_for_bit(rig_name, tmp_path):
     first = record(tmp_path, rig_name, 14.0, 3, "first")
     second = record(tmp_path, rig_name, 14.0, 3, "second")

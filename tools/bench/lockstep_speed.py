@@ -9,7 +9,7 @@ DRAWN = "drawn_fixes.toml"
 RECORDED, UNIT_S = 40.0, 0.011
 CASES = (
     ("fixes drawn from truth", DRAWN, 120.0, 40.0),
-    ("rendered sky, tracker busy 0.6 s", "published.toml", 40.0, 5.0),
+    ("rendered sky, tracker busy 0.6 s", "published_condition.toml", 40.0, 5.0),
     ("rendered sky, all 15 frames/s solved", "late_pipeline.toml", 40.0, 5.0),
 )
 """What, rig of one mock-up, virtual seconds, times real time (nothing recorded, as in campaigns)."""

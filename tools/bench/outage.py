@@ -64,7 +64,7 @@ def measure(bench: Bench) -> list[Row]:
 def _fly(bench: Bench, what: str, seed: int) -> float:
     rng = np.random.default_rng(seed)
     start_s = SETTLED_S + float(rng.uniform(0.0, SPREAD_S))
-    text = _default() if what == DEFAULT else read_text(RIGS / "published.toml")
+    text = _default() if what == DEFAULT else read_text(RIGS / "published_condition.toml")
     text += (
         f'\n[[laboratory.failures]]\nkind = "dead_sky"\nvehicle = "alpha"\n'
         f"start_s = {start_s:.3f}\nend_s = {start_s + OUTAGE_S:.3f}\n"

@@ -25,7 +25,7 @@ class Condition:
 
 
 CONDITIONS = (
-    Condition("published noise", "published.toml", 10.0, 0.5),
+    Condition("published noise", "published_condition.toml", 10.0, 0.5),
     Condition("data-sheet noise", "datasheet.toml", 15.0, 1.0),
 )
 

@@ -8,24 +8,30 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import Estimator
-from groundstation.fusion.estimators import ESTIMATORS
+from groundstation.fusion.estimators import ESTIMATORS, PUBLISHED
 from groundstation.fusion.rest_clock import RestClock
 from groundstation.parts.fusion.estimation import calibration_texts, floors_of, noise_of, rig_noise
 from groundstation.parts.fusion.force_stand_in import ForceStandIn
 from groundstation.parts.fusion.fusion import NO_FILES, Fusion
 from groundstation.parts.fusion.gauges import FIGURES, GAUGES
 from groundstation.parts.fusion.messages import FixAccount, FusionCalibration, FusionStatus, VehicleState
-from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle, fused_sources
+from groundstation.parts.fusion.sections import FusionOfType, FusionOfVehicle, FusionSection, fused_sources
 
 
 def _fusion(rig: Rig, vehicle: str) -> Node:
-    method = rig.of_type(vehicle, FusionOfType).fusion.method
-    noise, grid = noise_of(rig, vehicle), rig.table.slope_grid()
-    estimator = ESTIMATORS[method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
+    section = rig.of_type(vehicle, FusionOfType).fusion
+    estimator, method = _estimator(rig, vehicle, section), section.method
     type_ = rig.type_of(vehicle)
     push = ValvePush(type_.model(), type_.valves.open_delay_s, type_.valves.close_delay_s)
     stand_in = ForceStandIn(estimator, push, type_.mass_kg, type_.inertia_kg_m2)
     return fusion_node(rig, vehicle, estimator, method, calibration_texts(rig, vehicle), stand_in)
+
+
+def _estimator(rig: Rig, vehicle: str, section: FusionSection) -> Estimator:
+    noise, grid = noise_of(rig, vehicle), rig.table.slope_grid()
+    if section.method in PUBLISHED:
+        return PUBLISHED[section.method](noise, section.published.settings)
+    return ESTIMATORS[section.method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
 
 
 def fusion_node(

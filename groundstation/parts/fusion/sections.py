@@ -1,24 +1,48 @@
 """Keys of a rig file for estimators."""
 
+import math
 from typing import Self
 
 from pydantic import model_validator
 
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Positive, Section
-from groundstation.fusion.estimators import ESTIMATORS
+from groundstation.fusion.estimators import ESTIMATORS, PUBLISHED
+from groundstation.fusion.published_settings import AS_PUBLISHED, PublishedMotion
+
+
+class PublishedFusionSection(Section):
+    """What the published estimators are given beside what is published, and additions of ours, all off."""
+
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
+    start_heading_deg: float = 0.0
+    gate_needs_both: bool = False
+    median_zeros: bool = False
+    takes_exact_steps: bool = False
+    fills_gated: bool = False
+    fit_after_s: Positive | None = None
+
+    @property
+    def settings(self) -> PublishedMotion:
+        """As the estimators take them."""
+        given = self.model_dump(exclude={"start_heading_deg"})
+        return PublishedMotion(start_heading_rad=math.radians(self.start_heading_deg), **given)
 
 
 class FusionSection(Section):
-    """Which estimator, and how long the rest at the start must be."""
+    """Which estimator, what the published ones are given, and how long the rest at the start must be."""
 
     method: str = "filter"
     rest_s: Positive = 8.0
+    published: PublishedFusionSection = PublishedFusionSection()
 
     @model_validator(mode="after")
     def _known(self) -> Self:
         if self.method not in ESTIMATORS:
             raise ValueError(f"method {self.method!r} is none of {', '.join(sorted(ESTIMATORS))}")
+        if self.method not in PUBLISHED and self.published.settings != AS_PUBLISHED:
+            raise ValueError(f"published is for the methods {', '.join(PUBLISHED)}, not for {self.method!r}")
         return self
 
 

@@ -25,6 +25,7 @@ from groundstation.parts.stars.messages import (
 from groundstation.parts.stars.port import FixStreamPort, StarCameraPort
 from groundstation.parts.stars.sections import StarCameraSection, StarsOfType, StarsOfVehicle
 from groundstation.star_tracking.camera_model import CameraCalibration
+from groundstation.star_tracking.identifications import IMAGES
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 
 LINK_SIGMA_S = 0.001
@@ -78,17 +79,23 @@ def _picture_check(rig: Rig, vehicle: str) -> Node:
 def _spot_finder(rig: Rig, vehicle: str) -> Node:
     from groundstation.parts.stars.spot_finder import SpotFinder  # OpenCV loads only where it is used
 
-    lens = _camera(rig, vehicle).camera.value(CameraCalibration.parse)
-    return SpotFinder(vehicle, (lens.width, lens.height))
+    camera = _camera(rig, vehicle)
+    lens = camera.camera.value(CameraCalibration.parse)
+    return SpotFinder(vehicle, (lens.width, lens.height), IMAGES[camera.image](camera.sky_settings))
 
 
 def _star_tracker(rig: Rig, vehicle: str) -> Node:
     from groundstation.parts.stars.star_tracker import StarTracker
-    from groundstation.star_tracking.tracker import TrackerSettings
 
     camera = _camera(rig, vehicle)
-    settings = TrackerSettings(exposure_s=camera.exposure_s, readout_s=camera.readout_s)
-    return StarTracker(vehicle, camera.camera, camera.ceiling, ExposureDelay(*camera.delay), settings)
+    return StarTracker(
+        vehicle,
+        camera.camera,
+        camera.ceiling,
+        ExposureDelay(*camera.delay),
+        camera.sky_settings,
+        camera.identification,
+    )
 
 
 def _picture_keeper(rig: Rig, vehicle: str) -> Node:

@@ -1,18 +1,48 @@
 """Keys of a rig file for star cameras and for streams of fixes."""
 
-from typing import Self
+import math
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.section import Delay, Positive, Section, Sigma
+from groundstation.star_tracking.identifications import IDENTIFICATIONS, IMAGES, SkySettings
+from groundstation.star_tracking.published_settings import LEVEL_RATIO, PublishedSettings
 from groundstation.star_tracking.stamp_delay import parse_delay
+from groundstation.star_tracking.tracker_settings import TrackerSettings
+
+
+class PublishedStarsSection(Section):
+    """Limits of the published methods that the publication does not state, and additions of ours, all off."""
+
+    level_ratio: Annotated[float, Field(gt=0.0, lt=1.0)] = LEVEL_RATIO
+    angle_limit_deg: Annotated[float, Field(gt=0.0, le=60.0)] = 1.2
+    closeness_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.05
+    uses_tree: bool = False
+    drops_thin: bool = False
+    only_similar: bool = False
+    takes_median: bool = False
+
+    @property
+    def settings(self) -> PublishedSettings:
+        """As the identification takes them."""
+        return PublishedSettings(
+            math.radians(self.angle_limit_deg),
+            self.closeness_m,
+            self.uses_tree,
+            self.drops_thin,
+            self.only_similar,
+            self.takes_median,
+        )
 
 
 class StarCameraSection(Section):
     """The star camera: calibration files, delay from exposure to arrival, floor of its errors.
 
     ``delay_file`` is what `calibrate delay` wrote; it stands for ``delay_s`` and ``delay_sigma_s``.
+    ``image`` and ``identification`` name how a picture becomes spots, and spots a pose; ``published`` holds
+    what the published ones are given.
     """
 
     camera: RigFile
@@ -25,6 +55,16 @@ class StarCameraSection(Section):
     readout_s: Delay = 0.0
     sigma_xy_m: Sigma = 0.001
     sigma_heading_rad: Sigma = 0.0009
+    image: str = "default"
+    identification: str = "default"
+    published: PublishedStarsSection = PublishedStarsSection()
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        for key, table in (("image", IMAGES), ("identification", IDENTIFICATIONS)):
+            if getattr(self, key) not in table:
+                raise ValueError(f"{key} {getattr(self, key)!r} is none of {', '.join(table)}")
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -41,6 +81,12 @@ class StarCameraSection(Section):
             return self.delay_s, self.delay_sigma_s
         found = self.delay_file.value(parse_delay)
         return found.delay_s, found.sigma_s
+
+    @property
+    def sky_settings(self) -> SkySettings:
+        """What the rows of the tables of star tracking are given."""
+        tracker = TrackerSettings(exposure_s=self.exposure_s, readout_s=self.readout_s)
+        return SkySettings(tracker, self.published.settings, self.published.level_ratio)
 
 
 class StarsOfType(Section):

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.parts.stars.messages import StarImage, StarSpots
-from groundstation.star_tracking.detection import Detector, DetectorSettings, PictureError
+from groundstation.star_tracking.detection import Detector, PictureError
 from groundstation.star_tracking.fixes import Refusal
+from groundstation.star_tracking.identifications import FindSpots
 
 _NONE = np.empty(0, np.float32)
 
@@ -21,18 +22,18 @@ class SpotFinder(Node):
     Args:
         vehicle: Its name.
         size_px: Columns and rows of the frames for which the camera is calibrated; None for any.
-        settings: What counts as a spot.
+        find: Finds the spots of a picture; the default detector if None.
     """
 
     inputs = (StarImage,)
     outputs = (StarSpots,)
 
     def __init__(
-        self, vehicle: str, size_px: tuple[int, int] | None = None, settings: DetectorSettings | None = None
+        self, vehicle: str, size_px: tuple[int, int] | None = None, find: FindSpots | None = None
     ) -> None:
         super().__init__(vehicle)
         self._size_px = size_px
-        self._detector = Detector(settings)
+        self._find = Detector().find if find is None else find
         cv2.setNumThreads(1)  # results must not depend on the number of cores
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
@@ -44,7 +45,7 @@ class SpotFinder(Node):
             return
         image = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
         try:
-            spots = self._detector.find(image)
+            spots = self._find(image)
         except PictureError as error:
             yield self._unusable(message, str(error))
             return

@@ -16,14 +16,15 @@ from groundstation.parts.stars import star_answers
 from groundstation.parts.stars.actions import PICTURE
 from groundstation.parts.stars.messages import PictureTrouble, SkyChange, StarFix, StarMatches, StarSpots
 from groundstation.parts.stars.picture_choice import PictureChoice
-from groundstation.star_tracking import tracker
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import BodyMotion, NoFix, PictureFix, PosePrior
+from groundstation.star_tracking.identifications import IDENTIFICATIONS, SkySettings
 from groundstation.star_tracking.picture_notes import take_notes
 from groundstation.star_tracking.prior_governor import PriorGovernor
 from groundstation.star_tracking.sky_watch import SkyWatch
 from groundstation.star_tracking.star_catalogue import StarCatalogue
+from groundstation.star_tracking.tracker import StarTracker as OwnTracker
 
 _STILL_M = 1e-3
 """While its rows are read the picture may move so far; beyond, its lights are no witnesses of places."""
@@ -37,7 +38,8 @@ class StarTracker(Node):
     """Finds the ceiling in every set of spots, and names stars that died, moved or appeared.
 
     It starts from a prior where the state is known, else lost in space. Stars that died or moved are
-    dropped until they are back. Of refused pictures, and when asked, it states which light is what.
+    dropped until they are back: that takes the default identification, whose fixes name their stars for
+    certain. Of refused pictures, and when asked, it states which light is what.
 
     Args:
         vehicle: Its name.
@@ -45,6 +47,7 @@ class StarTracker(Node):
         ceiling: Star catalogue.
         delay: From the middle of the exposure to a picture's stamp.
         settings: Of the search, exposure and shutter included.
+        identification: Its row in the table of identifications.
 
     Raises:
         FileError: A file is missing or wrong.
@@ -60,13 +63,18 @@ class StarTracker(Node):
         camera: RigFile,
         ceiling: RigFile,
         delay: ExposureDelay,
-        settings: tracker.TrackerSettings,
+        settings: SkySettings,
+        identification: str = "default",
     ) -> None:
         super().__init__(vehicle)
         self._files = (camera, ceiling)
         self._stars, self._lens = ceiling.value(StarCatalogue.parse), camera.value(CameraCalibration.parse)
-        self._tracker = tracker.StarTracker(self._stars, self._lens, settings)
-        self._watch = SkyWatch(self._stars, self._lens, rays=self._tracker.rays)
+        self._readout_s = settings.tracker.readout_s
+        self._solver = IDENTIFICATIONS[identification](self._stars, self._lens, settings)
+        self._tracker = self._solver if isinstance(self._solver, OwnTracker) else None
+        self._watch = (
+            None if self._tracker is None else SkyWatch(self._stars, self._lens, rays=self._tracker.rays)
+        )
         self._governor = PriorGovernor()
         self._states: StateMemory[VehicleState] = StateMemory()
         self._choice = PictureChoice()
@@ -114,7 +122,7 @@ class StarTracker(Node):
             belief = star_answers.belief_of(state, sigma_s)
             motion = star_answers.motion_of(state)
         lights = star_answers.spots_of(spots)
-        answer = self._tracker.solve(lights, self._governor.admit(belief), motion)
+        answer = self._solver.solve(lights, self._governor.admit(belief), motion)
         self._governor.note(answer, belief)
         if isinstance(answer, NoFix):
             reason = f"{answer.reason.value}: {answer.detail}"
@@ -123,12 +131,24 @@ class StarTracker(Node):
             return
         yield star_answers.fix_message(spots, answer, exposure_ns, sigma_s)
         yield from self._explain(spots, lights, answer, "", "", belief)
-        if self._is_still(motion):
-            changes = self._watch.note(answer, lights)
-            if changes:
-                self._tracker.drop(self._watch.dropped)
-            for found in changes:
-                yield star_answers.change_message(spots, found, exposure_ns)
+        yield from self._witnessed(spots, lights, answer, motion, exposure_ns)
+
+    def _witnessed(
+        self,
+        spots: StarSpots,
+        lights: Spots,
+        answer: PictureFix,
+        motion: BodyMotion | None,
+        exposure_ns: int,
+    ) -> Iterator[SkyChange]:
+        """What a fix tells of the sky."""
+        if self._tracker is None or self._watch is None or not self._is_still(self._tracker, motion):
+            return
+        changes = self._watch.note(answer, lights)
+        if changes:
+            self._tracker.drop(self._watch.dropped)
+        for found in changes:
+            yield star_answers.change_message(spots, found, exposure_ns)
 
     def _repeats(self, spots: StarSpots) -> bool:
         """Whether the lights are bit for bit where they were in the set before: noise never does that."""
@@ -153,12 +173,11 @@ class StarTracker(Node):
             notes = take_notes(lights, answer, self._lens, self._stars, belief)
             yield star_answers.matches_message(spots, notes, reason)
 
-    def _is_still(self, motion: BodyMotion | None) -> bool:
-        readout_s = self._tracker.settings.readout_s
-        if readout_s == 0.0:
+    def _is_still(self, tracker: OwnTracker, motion: BodyMotion | None) -> bool:
+        if self._readout_s == 0.0:
             return True
         if motion is None:
             return False
         speed_m_s = abs(complex(motion.vx_table_m_s, motion.vy_table_m_s))
-        speed_m_s += 0.5 * self._tracker.rays.reach_m * abs(motion.rate_rad_s)
-        return speed_m_s * readout_s < _STILL_M
+        speed_m_s += 0.5 * tracker.rays.reach_m * abs(motion.rate_rad_s)
+        return speed_m_s * self._readout_s < _STILL_M

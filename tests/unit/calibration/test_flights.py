@@ -38,7 +38,7 @@ def test_each_fix_of_a_recording_has_its_own_covariance_and_the_rigs_floor(recor
 def test_the_reference_comes_along_on_the_same_clock(recording):
     data = read_flight(recording)
     assert len(data.reference) > 200
-    t, x, y, _ = data.reference.T
+    t, x, y, *_ = data.reference.T
     seen = np.column_stack([np.interp(data.stars[:, 0], t, x), np.interp(data.stars[:, 0], t, y)])
     assert np.abs(seen - data.stars[:, 2:4]).max() < 0.01
 

@@ -14,7 +14,7 @@ from bench.limits import plain, short
 from bench.rows import Bench, Row
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimator import EstimatorFactory
-from groundstation.fusion.reintegration import ReintegrationEstimator
+from groundstation.fusion.published_motion import joint
 
 OURS = "ours"
 
@@ -35,8 +35,8 @@ class Method:
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         OURS: Method(ErrorStateFilter),
-        "published method": Method(ReintegrationEstimator),
-        "published method, wrong fixes taken out for it": Method(ReintegrationEstimator, is_cleaned=True),
+        "published method": Method(joint),
+        "published method, wrong fixes taken out for it": Method(joint, is_cleaned=True),
         "filterpy": Method(FilterpyPeer),
         "gtsam": Method(GtsamPeer),
     }

@@ -15,7 +15,7 @@ from groundstation.rig.plan import make_node
 from groundstation.rig.read import parse_rig
 from groundstation.star_tracking.stamp_delay import read_delay
 
-RIG = Path(__file__).parents[4] / "examples" / "rigs" / "published.toml"
+RIG = Path(__file__).parents[4] / "examples" / "rigs" / "published_condition.toml"
 DELAY_S = 0.087
 JITTER_S = 0.004
 

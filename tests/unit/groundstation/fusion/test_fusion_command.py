@@ -211,3 +211,33 @@ def test_a_filter_that_lost_itself_says_so_and_starts_again(folder, tmp_path):
     reasons = [line.split(",")[2] for line in (tmp_path / "fixes.csv").read_text().splitlines()[1:]]
     assert reasons.count("outside the gate") == 3
     assert reasons[-2] == "used"
+
+
+@pytest.mark.parametrize("method", ["reintegration", "stars", "imu"])
+def test_the_published_methods_answer_each_packet_and_draw_it(folder, tmp_path, method):
+    plot = tmp_path / "plot.png"
+    result = run(folder, "--out", tmp_path / "estimate.csv", "--method", method, "--plot", plot)
+    assert result.exit_code == 0, result.output
+    estimate = np.genfromtxt(tmp_path / "estimate.csv", delimiter=",", names=True)
+    assert np.isfinite(estimate["x_m"][-500:]).all()
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_we_added_to_the_published_methods_changes_them_only_when_asked(folder, tmp_path):
+    out, texts = tmp_path / "e.csv", []
+    for words in ((), ("--exact-steps",), ("--fit-after", 5)):
+        assert run(folder, "--out", out, "--method", "reintegration", *words).exit_code == 0
+        texts.append(out.read_text())
+    assert len(set(texts)) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--median-zeros",), "go with --method reintegration, stars, imu"),
+        (("--method", "imu", "--fit-after", "0"), "above zero"),
+        (("--method", "none"), "one of filter, reintegration, stars, imu"),
+    ],
+)
+def test_options_that_nothing_takes_are_refused(folder, tmp_path, words, sentence):
+    assert sentence in refusal(folder, "--out", tmp_path / "e.csv", *words)

@@ -17,6 +17,7 @@ from groundstation.parts.stars.picture_keeper import PictureKeeper
 from groundstation.parts.stars.spot_finder import SpotFinder
 from groundstation.parts.stars.star_answers import notes_of
 from groundstation.parts.stars.star_tracker import StarTracker
+from groundstation.star_tracking.identifications import SkySettings
 from groundstation.star_tracking.picture_drawing import draw_notes
 from groundstation.star_tracking.picture_notes import NO_SPOT, SpotKind
 from groundstation.star_tracking.tracker import TrackerSettings
@@ -35,7 +36,7 @@ class Sky:
         camera.write_text(json.dumps(painter.camera.to_mapping()))
         rows = [f"s{i},{x:.6f},{y:.6f}" for i, (x, y) in enumerate(painter.stars_m)]
         ceiling.write_text("\n".join(["id,x_m,y_m", *rows]) + "\n")
-        settings = TrackerSettings(exposure_s=exposure_s)
+        settings = SkySettings(TrackerSettings(exposure_s=exposure_s))
         self.nodes = [
             PictureCheck("alpha"),
             SpotFinder("alpha", (painter.camera.width, painter.camera.height)),

@@ -217,3 +217,37 @@ def test_the_lens_from_the_stars_is_written_with_its_provenance(call, ceiling_fo
     for part in ("made_utc", "recording_sha256", "[fx]", "[k2]", "std = ", "[residual.reprojection_rms]"):
         assert part in text
     assert json.loads((folder / "better.json").read_text())["fx"] == pytest.approx(painter.camera.fx, abs=1.0)
+
+
+def test_both_halves_of_a_method_are_chosen_apart_and_drawn(call, ceiling_folder, tmp_path):
+    answers = {}
+    for name, words in {
+        "published": ("--method", "published"),
+        "halves": ("--image", "published", "--identification", "published"),
+        "ours": ("--method", "published", "--image", "default"),
+        "level": ("--method", "published", "--level", "0.6"),
+        "added": ("--method", "published", "--tree", "--drop-thin", "--only-similar", "--median"),
+    }.items():
+        out, plot = tmp_path / f"{name}.csv", tmp_path / f"{name}.png"
+        call("solve", ceiling_folder, "--out", out, "--plot", plot, *words)
+        assert plot.read_bytes().startswith(b"\x89PNG")
+        with out.open(newline="") as file:
+            answers[name] = [(row["fix"], row["x_m"]) for row in csv.DictReader(file)]
+    assert answers["published"] == answers["halves"]
+    assert len({str(answer) for answer in answers.values()}) == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--method", "none"), "--method must be one of default, published"),
+        (("--image", "none"), "--image must be one of"),
+        (("--level", "0.5"), "goes with --image published"),
+        (("--method", "published", "--level", "1"), "between 0 and 1"),
+        (("--median",), "go with --identification published"),
+        (("--method", "published", "--closeness-mm", "0"), "--closeness-mm must be above zero"),
+    ],
+)
+def test_options_that_nothing_takes_are_refused(call, ceiling_folder, tmp_path, words, sentence):
+    with pytest.raises(UsageError, match=sentence):
+        call("solve", ceiling_folder, "--out", tmp_path / "a.csv", *words)

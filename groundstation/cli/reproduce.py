@@ -1,0 +1,78 @@
+"""``groundstation reproduce``: published experiments run again, figure by figure."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from groundstation.declarations.errors import UsageError
+from groundstation.recording.errors import RecordingError
+from groundstation.studies.running import reproduce as run_study
+from groundstation.studies.study import FigureRow, Study
+from groundstation.studies.table import studies
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def reproduce(
+    study: Annotated[str | None, typer.Argument(help="Name of a study; without one they are listed.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for report.html, results.json and the flights' recordings.")
+    ] = None,
+    figure: Annotated[int | None, typer.Option(help="Only the published figure of this number.")] = None,
+) -> None:
+    """Run a published experiment again: each figure beside the published number, and with our defaults.
+
+    Flights are flown in the emulator under the published condition, as far as it is stated; what had to be
+    assumed stands beside each figure, and a number that does not come out is shown as such.
+
+    Example: groundstation reproduce
+
+    Example: groundstation reproduce air-table --out try/air_table
+
+    Example: groundstation reproduce air-table --out try/air_table --figure 16
+    """
+    known = studies()
+    if study is None:
+        if out is not None or figure is not None:
+            raise UsageError(f"name a study: {', '.join(known)}.")
+        for each in known.values():
+            _print_study(each)
+        return
+    if study not in known:
+        raise UsageError(f"there is no study {study!r}: there are {', '.join(known)}.")
+    if out is None:
+        raise UsageError("--out is needed: the folder for report.html and results.json.")
+    chosen = known[study]
+    rows = _rows(chosen, figure)
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("", total=1.0)
+        try:
+            written = run_study(
+                chosen, rows, out, lambda text, done: bar.update(task, description=text, completed=done)
+            )
+        except RecordingError as error:
+            raise UsageError(str(error)) from error
+    for path in written:
+        print(path)
+
+
+def _print_study(study: Study) -> None:
+    print(f"{study.name}: {study.title}")
+    for row in study.figures:
+        print(f"  {row.label}: {row.title}")
+
+
+def _rows(study: Study, figure: int | None) -> list[FigureRow]:
+    if figure is None:
+        return list(study.figures)
+    rows = [row for row in study.figures if figure in row.numbers]
+    if not rows:
+        known = ", ".join(str(number) for row in study.figures for number in row.numbers)
+        raise UsageError(f"{study.name} has no figure {figure} to draw: it draws {known}.")
+    return rows

@@ -1,0 +1,1 @@
+"""Studies: published experiments run again, figure by figure, beside what we do better."""

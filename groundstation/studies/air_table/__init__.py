@@ -1,0 +1,1 @@
+"""The published experiments on the air table: star camera and inertial block."""

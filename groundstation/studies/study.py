@@ -1,0 +1,143 @@
+"""What a published study is: flights, figures drawn from them, and numbers beside the published ones.
+
+A package adds a study by an entry point of the group ``groundstation.studies`` that names a `Study`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from groundstation.studies.flown import Flown
+
+PUBLISHED, DEFAULT = "published", "default"
+"""The two sides of every figure: the published methods, and ours, under the same condition."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightRow:
+    """A flight of a study.
+
+    Attributes:
+        scenario: Its scenario file.
+        rigs: The rig of each side.
+    """
+
+    scenario: Path
+    rigs: Mapping[str, Path]
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number of a figure beside the published one.
+
+    Attributes:
+        quantity: What, with its unit.
+        published: As published; NaN where nothing is stated.
+        ours: By the published methods on emulated data; NaN where it has no meaning.
+        default: By our defaults under the same condition.
+        assumed: What had to be assumed, or what the published number is.
+        ratio: Ours may differ by this factor, up or down, and still comes out; None: it is not compared.
+    """
+
+    quantity: str
+    published: float = math.nan
+    ours: float = math.nan
+    default: float = math.nan
+    assumed: str = ""
+    ratio: float | None = None
+
+    @classmethod
+    def beside(
+        cls,
+        quantity: str,
+        published: float,
+        sides: Iterable[float],
+        assumed: str = "",
+        ratio: float | None = None,
+    ) -> Number:
+        """A number of both sides: by the published methods, and by our defaults."""
+        ours, default = sides
+        return cls(quantity, published, ours, default, assumed, ratio)
+
+    @property
+    def comes_out(self) -> bool | None:
+        """Whether ours is the published number within the factor; None where they are not compared."""
+        if self.ratio is None or not math.isfinite(self.published):
+            return None
+        if not math.isfinite(self.ours) or self.ours * self.published <= 0.0:
+            return self.ours == self.published
+        return 1.0 / self.ratio <= self.ours / self.published <= self.ratio
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What a figure became.
+
+    Attributes:
+        pictures: Caption and SVG of each picture; the first of the published methods.
+        numbers: Beside the published ones.
+        words: What is seen.
+    """
+
+    pictures: Sequence[tuple[str, str]]
+    numbers: Sequence[Number]
+    words: str
+
+
+Sides = Mapping[str, Flown]
+"""A flight of each side."""
+Draw = Callable[[Mapping[str, Sides]], Drawn]
+"""Draws a figure from the flights that it needs, by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class FigureRow:
+    """A figure or table of a study.
+
+    Attributes:
+        numbers: Of the published figures that it redraws.
+        title: What they show.
+        published: What the publication shows and states there.
+        flights: Names of the flights that it needs.
+        draw: Draws it.
+        assumed: What is not published and had to be assumed, in sentences.
+        kind: ``figure`` or ``table``.
+    """
+
+    numbers: tuple[int, ...]
+    title: str
+    published: str
+    flights: tuple[str, ...]
+    draw: Draw
+    assumed: tuple[str, ...] = ()
+    kind: str = "figure"
+
+    @property
+    def label(self) -> str:
+        """As people call it: ``Figures 8, 9``."""
+        many = "s" if len(self.numbers) > 1 else ""
+        return f"{self.kind.capitalize()}{many} {', '.join(map(str, self.numbers))}"
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A publication that can be run again.
+
+    Attributes:
+        name: On the command line.
+        title: Of the publication, in English.
+        source: Who and where.
+        flights: By name.
+        figures: In order.
+        not_drawn: Figures that hold nothing to be computed, and why, by their numbers in words.
+    """
+
+    name: str
+    title: str
+    source: str
+    flights: Mapping[str, FlightRow]
+    figures: Sequence[FigureRow]
+    not_drawn: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,180 @@
+"""Studies: what is declared, how a number is judged, what the page and results.json say."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.declarations.errors import UsageError
+from groundstation.rig.read import load_rig, read_text
+from groundstation.scenario.loading import made
+from groundstation.scenario.scenario_file import WHAT, content_of
+from groundstation.studies import table
+from groundstation.studies.air_table.study import AIR_TABLE
+from groundstation.studies.page import render_page
+from groundstation.studies.plots import Axes, Line, Plan, over_time
+from groundstation.studies.running import reproduce, results_of
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, FigureRow, Number, Study
+
+DRAWN = Drawn(
+    [("A line <here>.", "<svg></svg>")],
+    [
+        Number("mean, s", 0.72, 0.75, 0.6, "so & so", ratio=1.1),
+        Number("worst, s", 2.7, 9.0, 0.6, ratio=1.5),
+        Number("drift, mm", ours=3.0),
+    ],
+    "What is seen.",
+)
+ROW = FigureRow((3, 4), "lines", "A line.", (), lambda flights: DRAWN, ("the speed",))
+STUDY = Study("made", "Made up", "By nobody.", {}, (ROW,), {"Figure 1": "a photograph"})
+
+
+@pytest.mark.parametrize(
+    ("published", "ours", "ratio", "comes_out"),
+    [
+        (0.72, 0.80, 1.2, True),
+        (0.72, 0.90, 1.2, False),
+        (0.72, 0.61, 1.2, True),
+        (0.72, 0.59, 1.2, False),
+        (-0.004, -0.0041, 1.1, True),
+        (0.005, -0.005, 1.1, False),  # of the other sign
+        (0.72, math.nan, 1.2, False),
+        (math.nan, 1.0, 1.2, None),
+        (0.72, 0.72, None, None),
+        (0.0, 0.0, 1.2, True),
+    ],
+)
+def test_a_number_comes_out_within_its_factor(published, ours, ratio, comes_out):
+    assert Number("x", published, ours, ratio=ratio).comes_out is comes_out
+
+
+def test_the_page_shows_what_does_not_come_out_and_asks_for_nothing_else():
+    page = render_page(STUDY, [(ROW, DRAWN)])
+    assert "1 published numbers come out" in page
+    assert ">does not come out<" in page
+    assert page.count("not stated") == 2  # the drift, and the words above
+    assert "A line &lt;here&gt;." in page
+    assert "so &amp; so" in page
+    assert "prefers-color-scheme: dark" in page
+    assert "@media print" in page
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert "Figures 3, 4: lines" in page
+    assert "a photograph" in page
+    assert "the speed" in page
+
+
+def test_results_have_a_row_per_number_and_null_where_nothing_is_stated():
+    rows = results_of([(ROW, DRAWN), (replace(ROW, numbers=(2,), kind="table"), DRAWN)])
+    assert rows[0] == {
+        "figure": "3, 4",
+        "quantity": "mean, s",
+        "published": 0.72,
+        "ours": 0.75,
+        "default": 0.6,
+        "assumed": "so & so the speed",
+        "comes_out": True,
+    }
+    assert (rows[2]["published"], rows[2]["ours"], rows[2]["default"]) == (None, 3.0, None)
+    assert rows[3]["table"] == "2"
+
+
+def test_a_study_without_flights_is_written_whole(tmp_path):
+    said = []
+    page, results = reproduce(STUDY, STUDY.figures, tmp_path, lambda text, done: said.append((text, done)))
+    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert len(json.loads(results.read_text(encoding="utf-8"))) == 3
+    assert said == [("drawing figures 3, 4", 0.0)]
+    assert not (tmp_path / "flights").exists()
+
+
+@pytest.mark.parametrize("study", table.studies().values(), ids=lambda study: study.name)
+def test_every_flight_of_a_study_can_be_made_on_both_sides(study):
+    for row in study.flights.values():
+        assert set(row.rigs) == {PUBLISHED, DEFAULT}
+        for rig in row.rigs.values():
+            content = content_of(read_text(row.scenario, WHAT), row.scenario)
+            assert made(content, row.scenario, load_rig(rig)).rig.vehicles
+    for figure in study.figures:
+        assert set(figure.flights) <= set(study.flights)
+    drawn = [number for figure in study.figures for number in figure.numbers]
+    assert len(drawn) == len(set(drawn))
+
+
+def test_every_figure_of_the_paper_is_drawn_or_said_why_not():
+    drawn = {number for figure in AIR_TABLE.figures for number in figure.numbers}
+    words = " ".join(AIR_TABLE.not_drawn).replace(",", " ").split()
+    assert drawn | {int(word) for word in words if word.isdecimal()} == set(range(1, 25))
+
+
+class Point:
+    name, value, dist = "other", "other:STUDY", None
+
+    def __init__(self, found):
+        self.found = found
+
+    def load(self):
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+
+def test_a_package_adds_a_study(monkeypatch):
+    monkeypatch.setattr(table, "entry_points", lambda group: [Point(STUDY)])
+    assert list(table.studies()) == ["air-table", "made"]
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (ImportError("gone"), "cannot be loaded"),
+        ("no study", "is no Study"),
+        (AIR_TABLE, "another study 'air-table'"),
+    ],
+)
+def test_a_study_that_is_none_is_named(monkeypatch, found, words):
+    monkeypatch.setattr(table, "entry_points", lambda group: [Point(found)])
+    with pytest.raises(UsageError, match=words):
+        table.studies()
+
+
+def test_studies_are_listed_and_what_is_not_there_is_named(groundstation, tmp_path):
+    listed = groundstation("reproduce").stdout
+    assert "air-table" in listed
+    assert "Figures 21, 22, 23, 24" in listed
+    for words, sentence in (
+        (("nothing",), "there is no study 'nothing'"),
+        (("air-table",), "--out is needed"),
+        (("air-table", "--out", tmp_path, "--figure", "12"), "has no figure 12"),
+        (("--figure", "8"), "name a study"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            groundstation("reproduce", *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_figure_that_needs_no_flight_is_drawn_alone(groundstation, tmp_path):
+    groundstation("reproduce", "air-table", "--out", tmp_path, "--figure", "4")
+    rows = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    triangles = next(row for row in rows if "triangles" in row["quantity"])
+    assert (triangles["published"], triangles["ours"], triangles["comes_out"]) == (322, 348, False)
+
+
+def test_a_picture_over_time_holds_lines_dots_and_marks():
+    t = np.linspace(0.0, 10.0, 50)
+    lines = [Line("one", "v0", t, np.sin(t)), Line("dots", "v1", t, np.cos(t), is_dots=True)]
+    panels = [Axes("a, m", lines), Axes("b", lines[:1], (0.0, 2.0))]
+    picture = over_time(panels, 0.0, 10.0, "two", (3.0, 12.0))
+    assert picture.count('class="line v0"') == 2 + 1  # and its entry in the legend
+    assert picture.count('class="dots v1"') == 1
+    assert picture.count('class="injected"') == 2  # in each panel; 12 s lies outside
+    assert 'aria-label="two"' in picture
+
+
+def test_a_plan_keeps_its_scale_along_both_axes():
+    plan = Plan((-1.0, 1.0), (-0.5, 0.5))
+    (x0, x1), (y0, y1) = plan.place(np.array([0.0, 0.1]), np.array([0.0, 0.1]))
+    assert x1 - x0 == pytest.approx(y0 - y1)  # y grows upwards on the table
+    drawn = plan.asterisks(np.array([0.0]), np.array([0.0]), "failure") + plan.arrows(*np.zeros((4, 1)))
+    assert drawn.count("<path") == 2
