@@ -8,8 +8,8 @@ DRAWING = (
     *(
         ("calibrate", name)
         for name in (
-            "allan", "board", "delay", "gyro-scale", "joint", "laboratory", "lens", "mount", "overhead", "survey",
-            "table-map", "temperature", "tilt", "zero-offset", "zero-offset-fit",
+            "allan", "board", "delay", "gyro-scale", "joint", "laboratory", "lens", "mount", "overhead",
+            "survey", "table-map", "temperature", "tilt", "zero-offset", "zero-offset-fit",
         )
     ),
 )  # fmt: skip
