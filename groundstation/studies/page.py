@@ -21,11 +21,11 @@ ul { margin: .3rem 0; padding-left: 1.2rem; } .toc { columns: 2; font-size: .9re
 @media (max-width: 40rem) { .toc { columns: 1; } }
 """
 ABOUT = (
-    "Redrawn from data of the emulator, not from hardware. Published methods are those of the publication to "
-    "the letter, our defaults ours under the same condition; both were flown in a closed loop, so their ways "
-    "differ a little. A number comes out where it is the published one within the factor that its row allows; "
-    "one that the condition was chosen to have is called put in, for it proves nothing. t = 0 is when the "
-    "flight begins."
+    "Redrawn from data of the emulator, not from hardware. Published methods are those of the publication "
+    "to the letter, our defaults ours under the same condition; both were flown in a closed loop, so "
+    "their ways differ a little. A number comes out where it is the published one within the factor that "
+    "its row allows; one that the condition was chosen to have is called put in, for it proves nothing. t "
+    "= 0 is when the flight begins."
 )
 
 

@@ -88,7 +88,8 @@ AIR_TABLE = Study(
             (
                 *_IMU,
                 *_PULSES,
-                "known initial conditions: the last fix of the rest; zeros that a disturbance of the rest put off",
+                "known initial conditions: the last fix of the rest; zeros that a disturbance of the rest "
+                "put off",
             ),
         ),
         FigureRow(
