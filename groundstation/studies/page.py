@@ -24,7 +24,8 @@ ABOUT = (
     "Redrawn from data of the emulator, not from hardware. Published methods are those of the publication "
     "to the letter, our defaults ours under the same condition; both were flown in a closed loop, so "
     "their ways differ a little. A number comes out where it is the published one within the factor that "
-    "its row allows. t = 0 is when the flight begins."
+    "its row allows; one that the condition was chosen to have is called put in, for it proves nothing. t "
+    "= 0 is when the flight begins."
 )
 
 
@@ -112,6 +113,8 @@ def _word(value: float, nothing: str = "\u2013") -> str:
 
 
 def _verdict(number: Number) -> str:
+    if number.is_put_in:
+        return '<span class="faint">put in</span>'
     if number.comes_out is None:
         return ""
     return (

@@ -77,6 +77,7 @@ def results_of(drawn: Sequence[tuple[FigureRow, Drawn]]) -> list[dict[str, Any]]
             "default": _plain(number.default),
             "assumed": " ".join((number.assumed, *row.assumed)).strip(),
             "comes_out": number.comes_out,
+            "put_in": number.is_put_in,
         }
         for row, found in drawn
         for number in found.numbers

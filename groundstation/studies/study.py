@@ -40,6 +40,7 @@ class Number:
         default: By our defaults under the same condition.
         assumed: What had to be assumed, or what the published number is.
         ratio: Ours may differ by this factor, up or down, and still comes out; None: it is not compared.
+        is_put_in: The condition was chosen to have this number: that it is there proves nothing.
     """
 
     quantity: str
@@ -48,6 +49,7 @@ class Number:
     default: float = math.nan
     assumed: str = ""
     ratio: float | None = None
+    is_put_in: bool = False
 
     @classmethod
     def beside(
@@ -57,15 +59,17 @@ class Number:
         sides: Iterable[float],
         assumed: str = "",
         ratio: float | None = None,
+        *,
+        is_put_in: bool = False,
     ) -> Number:
         """A number of both sides: by the published methods, and by our defaults."""
         ours, default = sides
-        return cls(quantity, published, ours, default, assumed, ratio)
+        return cls(quantity, published, ours, default, assumed, ratio, is_put_in)
 
     @property
     def comes_out(self) -> bool | None:
         """Whether ours is the published number within the factor; None where they are not compared."""
-        if self.ratio is None or not math.isfinite(self.published):
+        if self.ratio is None or self.is_put_in or not math.isfinite(self.published):
             return None
         if not math.isfinite(self.ours) or self.ours * self.published <= 0.0:
             return self.ours == self.published

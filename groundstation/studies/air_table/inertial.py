@@ -75,7 +75,7 @@ def draw_accelerations(flights: Mapping[str, Sides]) -> Drawn:
             control,
             NAN,
             "two valves of 0.22 N a side on 11 kg give it; force and mass are assumed",
-            ratio=1.3,
+            is_put_in=True,
         ),
         Number(
             "spikes, m/s^2",
@@ -84,9 +84,9 @@ def draw_accelerations(flights: Mapping[str, Sides]) -> Drawn:
             NAN,
             "injected: 0.77 N for 20 ms; the publication suspects valves that open by themselves, or the "
             "floor",
-            ratio=1.3,
+            is_put_in=True,
         ),
-        Number("time between spikes, s", SPIKE_EVERY_S, every_s, NAN, "injected", ratio=1.1),
+        Number("time between spikes, s", SPIKE_EVERY_S, every_s, NAN, "injected", is_put_in=True),
     ]
     words = "Control pulses stand out of the noise, and shocks of two samples stand out of both."
     return Drawn(pictures, numbers, words)
@@ -133,7 +133,7 @@ def draw_imu_alone(flights: Mapping[str, Sides]) -> Drawn:
             LAG_S,
             map(_lag, (flown, default)),
             "from the middle of the exposure to the arrival",
-            ratio=1.3,
+            is_put_in=True,
         ),
         Number.beside(
             "position of the estimate off truth after 10 s, mm",
@@ -146,7 +146,7 @@ def draw_imu_alone(flights: Mapping[str, Sides]) -> Drawn:
             1e3 * DRIFT_M,
             1e3 * 0.5 * OFFSET_M_S2 * DRIFT_AFTER_S**2,
             assumed="arithmetic of the publication",
-            ratio=1.01,
+            is_put_in=True,
         ),
         Number(
             "error of the rest's zeros as the flight feels them, m/s^2",

@@ -46,9 +46,9 @@ def draw_offset_fit(flights: Mapping[str, Sides]) -> Drawn:
             ALPHA_M_S2,
             short.alpha_m_s2,
             assumed="the rest was disturbed such that its zeros are off by so much; their sign is doubtful",
-            ratio=1.3,
+            is_put_in=True,
         ),
-        Number("beta over 10 s, m/s^2", BETA_M_S2, short.beta_m_s2, assumed="likewise", ratio=1.3),
+        Number("beta over 10 s, m/s^2", BETA_M_S2, short.beta_m_s2, assumed="likewise", is_put_in=True),
         Number(
             "alpha with the printed sign, m/s^2",
             ours=short.printed[0],

@@ -48,7 +48,7 @@ def draw_sky(flights: Mapping[str, Sides]) -> Drawn:
     parts = [plan.way(corners[:, 0], corners[:, 1], "v0 thin"), plan.dots(points[:, 0], points[:, 1], "v4")]
     picture = plan.picture(parts, (("v4", "LEDs"), ("v0", "Delaunay triangles")), "Triangulated ceiling")
     numbers = [
-        Number("LEDs", STARS, len(points), NAN, ratio=1.001),
+        Number("LEDs", STARS, len(points), NAN, is_put_in=True),
         Number(
             "triangles of the catalogue",
             TRIANGLES,
@@ -74,8 +74,15 @@ def draw_perimeter(flights: Mapping[str, Sides]) -> Drawn:
     ours, default = (_spent_s(sides[side]) for side in (PUBLISHED, DEFAULT))
     failed = [_failed_share(sides[side]) for side in (PUBLISHED, DEFAULT)]
     numbers = [
-        Number.beside("typical time of a fix, s", TYPICAL_S, map(_median, (ours, default)), ratio=1.05),
-        Number("mean time of a fix, s", MEAN_S, float(ours.mean()), float(default.mean()), ratio=1.15),
+        Number.beside("typical time of a fix, s", TYPICAL_S, map(_median, (ours, default)), is_put_in=True),
+        Number(
+            "mean time of a fix, s",
+            MEAN_S,
+            float(ours.mean()),
+            float(default.mean()),
+            "level and limits were chosen for about this",
+            is_put_in=True,
+        ),
         Number(
             "longest time of a fix, s",
             WORST_S,
@@ -89,7 +96,7 @@ def draw_perimeter(flights: Mapping[str, Sides]) -> Drawn:
             1.0 - TYPICAL_S / MEAN_S,
             failed,
             "deduced from the two times for independent tries, not stated",
-            ratio=1.8,
+            is_put_in=True,
         ),
     ]
     words = (

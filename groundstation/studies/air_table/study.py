@@ -85,7 +85,12 @@ AIR_TABLE = Study(
             "apart, since a zero that is off by 0.001 m/s^2 makes 0.05 m in 10 s.",
             ("pulses",),
             draw_imu_alone,
-            (*_IMU, *_PULSES, "known initial conditions: the last fix of the rest"),
+            (
+                *_IMU,
+                *_PULSES,
+                "known initial conditions: the last fix of the rest; zeros that a disturbance of the rest "
+                "put off",
+            ),
         ),
         FigureRow(
             (18, 19),

@@ -50,6 +50,14 @@ def test_a_number_comes_out_within_its_factor(published, ours, ratio, comes_out)
     assert Number("x", published, ours, ratio=ratio).comes_out is comes_out
 
 
+def test_a_number_that_was_put_in_proves_nothing():
+    number = Number("x", 0.6, 0.6, ratio=1.1, is_put_in=True)
+    assert number.comes_out is None
+    page = render_page(STUDY, [(ROW, replace(DRAWN, numbers=[number]))])
+    assert ">put in<" in page
+    assert "0 published numbers come out" in page
+
+
 def test_the_page_shows_what_does_not_come_out_and_asks_for_nothing_else():
     page = render_page(STUDY, [(ROW, DRAWN)])
     assert "1 published numbers come out" in page
@@ -75,6 +83,7 @@ def test_results_have_a_row_per_number_and_null_where_nothing_is_stated():
         "default": 0.6,
         "assumed": "so & so the speed",
         "comes_out": True,
+        "put_in": False,
     }
     assert (rows[2]["published"], rows[2]["ours"], rows[2]["default"]) == (None, 3.0, None)
     assert rows[3]["table"] == "2"
