@@ -25,7 +25,7 @@ def found(flight):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.parametrize("rig", RIGS)
 def test_a_healthy_rig_has_no_faults(fly, rig, seed):
     flight = fly(rig=rig, seed=seed, short_rest=False).run(FLY_S)
