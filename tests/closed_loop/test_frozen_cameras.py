@@ -1,5 +1,7 @@
 """A camera that repeats itself gives no fixes, and the state's sigma says what follows from that."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,17 @@ def test_rendered_pictures_that_repeat_are_no_fixes(fly):
     used = [account for account in flight.of(FixAccount) if account.used]
     assert max(account.stamp_ns for account in used) < FROZEN_S * 1e9 + 8e7
     assert_truthful(flight, FROZEN_S + 1.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_camera_that_repeats_a_pose_accuses_no_gyro(fly, seed):
+    """The mock-up turns on while the repeated heading stands: the camera is wrong, and alone is named."""
+    more = frozen().replace(f"start_s = {FROZEN_S}", "start_s = 9.0")
+    flight = fly(more, rig="two_mock_ups_drawn", seed=seed)
+    flight.run(7.0)
+    flight.request("go_to", json.dumps({"x_m": -0.5, "y_m": 0.1, "heading_rad": 2.5}))
+    flight.run(8.0)
+    turned = [abs(row.rate_rad_s) for row in flight.of(ReferenceState, start_s=9.0, stop_s=10.0)]
+    assert max(turned) > 0.05
+    assert "camera_frozen" in flight.faults()
+    assert flight.faults() <= {"camera_frozen", "star_outage", "position_uncertain"}

@@ -64,6 +64,7 @@ class FaultDetector(Node):
         own = (Imu, FixAccount, FusionStatus, ValveCommand, ValveStatus, Supervision)
         self.inputs = (*own, *((PictureTrouble,) if has_pictures else ()), *fixes)
         self._sources = fixes
+        self._poses: dict[str, tuple[float, float, float]] = {}
         self._imu_watch = ImuWatch()
         self._fix_watch = FixWatch()
         self._valves = valves
@@ -153,8 +154,11 @@ class FaultDetector(Node):
     def _fix(self, fix: PoseFix, now_ns: int) -> None:
         if not fix.fix:
             self._fix_watch.take_picture(now_ns, str(getattr(fix, "reason", "")))
-        elif self._is_carried(now_ns):
-            self._imu.fix(self._sources[type(fix)], fix.stamp_ns, fix.heading_rad, fix.stamp_sigma_s)
+            return
+        source, pose = self._sources[type(fix)], (fix.x_m, fix.y_m, fix.heading_rad)
+        is_repeated, self._poses[source] = pose == self._poses.get(source), pose
+        if self._is_carried(now_ns) and not is_repeated:  # a camera that repeats itself tells of no turn
+            self._imu.fix(source, fix.stamp_ns, fix.heading_rad, fix.stamp_sigma_s)
 
     def _account(self, account: FixAccount, now_ns: int) -> None:
         self._fix_watch.take_account(now_ns, account.stamp_ns, is_used=account.used, reason=account.reason)
