@@ -32,7 +32,7 @@ def first_torn(flight):
 
 @pytest.mark.slow
 @pytest.mark.provokes("camera_torn")
-@pytest.mark.parametrize("rig", ["published", "late_pipeline"])
+@pytest.mark.parametrize("rig", ["published_condition", "late_pipeline"])
 def test_a_torn_camera_is_named_at_once_by_who_sees_every_picture(fly, rig):
     flight = fly(TORN, rig=rig).run(START_S + 3.0)
     moment_s, words = first_torn(flight)
