@@ -10,6 +10,7 @@ import pytest
 TOOL = Path(__file__).parents[2] / "tools" / "hostile_commands.py"
 
 
+@pytest.mark.timeout(1200)  # twenty minutes of two mock-ups
 @pytest.mark.slow
 def test_twenty_hostile_sequences_take_nobody_off_the_table_or_into_another(tmp_path):
     out = tmp_path / "sequences.jsonl"
