@@ -15,6 +15,7 @@ from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.declarations.errors import UsageError
+from groundstation.files.amounts import UNITLESS
 from groundstation.files.png import png_of
 from groundstation.files.writing import Content, check_targets, write_files
 from groundstation.fusion.error_state_filter import ErrorStateFilter
@@ -102,8 +103,8 @@ def run(
         raise UsageError(f"--smooth works on the filter, not on --method {method}.")
     if table_map is not None and method != "filter":
         raise UsageError(f"--table-map works on the filter, not on --method {method}.")
-    if fit_after is not None and not 0.0 < fit_after < math.inf:
-        raise UsageError(f"--fit-after must be above zero, found {fit_after:g}.")
+    if fit_after is not None and not 0.0 < fit_after <= UNITLESS:
+        raise UsageError(f"--fit-after must be above zero and at most {UNITLESS:g}, found {fit_after:g}.")
     settings = PublishedMotion(
         gate_needs_both=gate_both,
         median_zeros=median_zeros,

@@ -1,6 +1,5 @@
 """What `star-tracker solve` is asked for, checked."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,12 +58,12 @@ class SkyOptions:
                 raise UsageError(f"{option} must be one of {', '.join(table)}, found {row!r}.")
         if self.level is not None and not 0.0 < self.level < 1.0:
             raise UsageError(f"--level must lie between 0 and 1, found {self.level:g}.")
-        for option, value in (
-            ("--angle-limit-deg", self.angle_limit_deg),
-            ("--closeness-mm", self.closeness_mm),
+        for option, value, most in (
+            ("--angle-limit-deg", self.angle_limit_deg, 60.0),
+            ("--closeness-mm", self.closeness_mm, 10_000.0),
         ):
-            if value is not None and not 0.0 < value < math.inf:
-                raise UsageError(f"{option} must be above zero, found {value:g}.")
+            if value is not None and not 0.0 < value <= most:
+                raise UsageError(f"{option} must be above zero and at most {most:g}, found {value:g}.")
         if self.level is not None and self.image_row != PUBLISHED:
             raise UsageError("--level goes with --image published.")
         limits = (self.angle_limit_deg, self.closeness_mm)
@@ -76,11 +75,11 @@ class SkyOptions:
     @cached_property
     def settings(self) -> SkySettings:
         """What the rows are given."""
-        standard = PublishedSettings()
-        published = PublishedSettings(
-            standard.angle_limit_rad if self.angle_limit_deg is None else math.radians(self.angle_limit_deg),
-            standard.closeness_m if self.closeness_mm is None else 1e-3 * self.closeness_mm,
-            **self.added,
-        )
+        limits = {
+            "angle_limit_deg": self.angle_limit_deg,
+            "closeness_m": None if self.closeness_mm is None else 1e-3 * self.closeness_mm,
+        }
+        given = {name: value for name, value in limits.items() if value is not None}
+        published = PublishedSettings.model_validate({**given, **self.added})
         level = LEVEL_RATIO if self.level is None else self.level
         return SkySettings(published=published, level_ratio=level)

@@ -117,11 +117,8 @@ def _verdict(number: Number) -> str:
         return '<span class="faint">put in</span>'
     if number.comes_out is None:
         return ""
-    return (
-        '<span class="comes">comes out</span>'
-        if number.comes_out
-        else '<span class="out">does not come out</span>'
-    )
+    name, words = ("comes", "comes out") if number.comes_out else ("out", "does not come out")
+    return f'<span class="{name}">{words}</span> <span class="faint">within {number.ratio:g} times</span>'
 
 
 def _not_drawn(study: Study) -> str:

@@ -373,3 +373,9 @@ def test_an_action_says_what_it_does_and_its_arguments_say_their_unit(action):
     for argument in action.arguments:
         if argument.kind is float:
             assert re.search(r"_(m|m_s|rad|rad_s|s|n|nm)$", argument.name), argument.name
+
+
+def test_no_two_rows_of_the_view_stand_at_the_same_place():
+    """Of equal ones the order would hang on that of the parts, and a row could part another from its rows."""
+    orders = [row.order for part in TABLES.parts.values() for row in part.gauges]
+    assert len(orders) == len(set(orders))

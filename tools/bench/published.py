@@ -8,7 +8,7 @@ generated ones.
 import csv
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -159,7 +159,7 @@ def _flight_below(folder: Path | None, name: str) -> Path | None:
 def _imu_off_mm(folder: Path, *, median_zeros: bool = False) -> float:
     """Distance from the truth 10 s after the start of the motion."""
     data = read_folder(folder)
-    settings = replace(AS_PUBLISHED, median_zeros=median_zeros)
+    settings = AS_PUBLISHED.model_copy(update={"median_zeros": median_zeros})
     states, _ = estimate(data, imu_alone(data.noise, settings))
     row = int(np.searchsorted(data.imu[:, 0], data.run_start_s + AFTER_S))
     state = next(each for each in states[row:] if each is not None)

@@ -30,7 +30,7 @@ def _fusion(rig: Rig, vehicle: str) -> Node:
 def _estimator(rig: Rig, vehicle: str, section: FusionSection) -> Estimator:
     noise, grid = noise_of(rig, vehicle), rig.table.slope_grid()
     if section.method in PUBLISHED:
-        return PUBLISHED[section.method](noise, section.published.settings)
+        return PUBLISHED[section.method](noise, section.published)
     return ESTIMATORS[section.method](noise) if grid is None else ErrorStateFilter(noise, table_map=grid)
 
 

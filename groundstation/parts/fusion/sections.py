@@ -1,6 +1,5 @@
 """Keys of a rig file for estimators."""
 
-import math
 from typing import Self
 
 from pydantic import model_validator
@@ -8,26 +7,11 @@ from pydantic import model_validator
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.section import Positive, Section
 from groundstation.fusion.estimators import ESTIMATORS, PUBLISHED
-from groundstation.fusion.published_settings import AS_PUBLISHED, PublishedMotion
+from groundstation.fusion.published_settings import PublishedMotion
 
 
-class PublishedFusionSection(Section):
+class PublishedFusionSection(Section, PublishedMotion):
     """What the published estimators are given beside what is published, and additions of ours, all off."""
-
-    start_x_m: float = 0.0
-    start_y_m: float = 0.0
-    start_heading_deg: float = 0.0
-    gate_needs_both: bool = False
-    median_zeros: bool = False
-    takes_exact_steps: bool = False
-    fills_gated: bool = False
-    fit_after_s: Positive | None = None
-
-    @property
-    def settings(self) -> PublishedMotion:
-        """As the estimators take them."""
-        given = self.model_dump(exclude={"start_heading_deg"})
-        return PublishedMotion(start_heading_rad=math.radians(self.start_heading_deg), **given)
 
 
 class FusionSection(Section):
@@ -41,7 +25,7 @@ class FusionSection(Section):
     def _known(self) -> Self:
         if self.method not in ESTIMATORS:
             raise ValueError(f"method {self.method!r} is none of {', '.join(sorted(ESTIMATORS))}")
-        if self.method not in PUBLISHED and self.published.settings != AS_PUBLISHED:
+        if self.method not in PUBLISHED and self.published != PublishedFusionSection():
             raise ValueError(f"published is for the methods {', '.join(PUBLISHED)}, not for {self.method!r}")
         return self
 

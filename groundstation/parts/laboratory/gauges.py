@@ -40,4 +40,4 @@ def _words(message: InjectedFailure) -> str:
     return message.failure.replace("_", " ") + (f" ({shown})" if shown else "")
 
 
-GAUGES = (GaugeRow(90, FailureGauge),)
+GAUGES = (GaugeRow(130, FailureGauge),)

@@ -1,6 +1,5 @@
 """Keys of a rig file for star cameras and for streams of fixes."""
 
-import math
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -13,28 +12,10 @@ from groundstation.star_tracking.stamp_delay import parse_delay
 from groundstation.star_tracking.tracker_settings import TrackerSettings
 
 
-class PublishedStarsSection(Section):
-    """Limits of the published methods that the publication does not state, and additions of ours, all off."""
+class PublishedStarsSection(Section, PublishedSettings):
+    """What the published methods are given: the level of the picture steps, and the identification's."""
 
     level_ratio: Annotated[float, Field(gt=0.0, lt=1.0)] = LEVEL_RATIO
-    angle_limit_deg: Annotated[float, Field(gt=0.0, le=60.0)] = 1.2
-    closeness_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.05
-    uses_tree: bool = False
-    drops_thin: bool = False
-    only_similar: bool = False
-    takes_median: bool = False
-
-    @property
-    def settings(self) -> PublishedSettings:
-        """As the identification takes them."""
-        return PublishedSettings(
-            math.radians(self.angle_limit_deg),
-            self.closeness_m,
-            self.uses_tree,
-            self.drops_thin,
-            self.only_similar,
-            self.takes_median,
-        )
 
 
 class StarCameraSection(Section):
@@ -86,7 +67,7 @@ class StarCameraSection(Section):
     def sky_settings(self) -> SkySettings:
         """What the rows of the tables of star tracking are given."""
         tracker = TrackerSettings(exposure_s=self.exposure_s, readout_s=self.readout_s)
-        return SkySettings(tracker, self.published.settings, self.published.level_ratio)
+        return SkySettings(tracker, self.published, self.published.level_ratio)
 
 
 class StarsOfType(Section):

@@ -34,7 +34,7 @@ def test_a_command_process_that_gets_no_processor_for_a_while_says_so_and_flies_
     run = flying(launch, two_drawn)
     pid = run.pids()["commands"]
     os.kill(pid, signal.SIGSTOP)
-    time.sleep(STARVED_S)
+    time.sleep(STARVED_S)  # what the test is about: a stopped process for so long, and nothing to wait for
     os.kill(pid, signal.SIGCONT)
     line = run.wait_for("alpha: FAULT cpu_starved")
     assert "ms late" in line

@@ -56,7 +56,7 @@ def pose_of(state):
 
 
 def test_joint_begins_at_once_from_rough_conditions_that_nobody_flies_by(flight):
-    settings = PublishedMotion(start_x_m=0.3, start_y_m=-0.2, start_heading_rad=0.5)
+    settings = PublishedMotion(start_x_m=0.3, start_y_m=-0.2, start_heading_deg=math.degrees(0.5))
     own = flight("reintegration", settings=settings)
     assert pose_of(own.states[0]) == (0.5, 0.0, 0.0, 0.3, -0.2)
     own.take_off()

@@ -31,7 +31,7 @@ CAMERA = CameraCalibration(
     mount_tilt_x_rad=0.0,
     mount_tilt_y_rad=0.0,
 )
-EXACT = PublishedSettings(angle_limit_rad=1e-6, closeness_m=1e-3)
+EXACT = PublishedSettings(angle_limit_deg=6e-5, closeness_m=1e-3)
 
 
 def spots_at(points_px):
@@ -104,7 +104,10 @@ def test_every_triangle_counts_thin_ones_too():
     thin = np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.05)])  # 177 deg in the middle
     assert len(triangles_of(thin)[0]) == 1
     fat = np.concatenate((thin, [(1.0, -3.0)]))
-    assert tracker(stars_m=fat).triangles == tracker(replace(EXACT, drops_thin=True), fat).triangles + 1
+    assert (
+        tracker(stars_m=fat).triangles
+        == tracker(EXACT.model_copy(update={"drops_thin": True}), fat).triangles + 1
+    )
 
 
 def test_three_vertices_give_the_affine_map_through_them():
@@ -145,7 +148,7 @@ def test_the_longest_run_is_close_along_both_axes_for_every_pair():
 def test_the_mean_of_the_run_and_not_its_median_is_the_answer():
     pose, moved = (0.55, 0.45, 0.4), np.zeros((6, 2))
     moved[4] = 0.3, -0.2  # one centre is off: the maps of its triangles differ
-    settings = PublishedSettings(angle_limit_rad=np.deg2rad(0.5), closeness_m=0.05)
+    settings = PublishedSettings(angle_limit_deg=0.5, closeness_m=0.05)
     spot_px = seen_from(*pose) + moved
     fix = tracker(settings).solve(spots_at(spot_px))
     triangles, _ = triangles_of(spot_px)
@@ -160,7 +163,7 @@ def test_the_mean_of_the_run_and_not_its_median_is_the_answer():
     assert fix.mode is Mode.PUBLISHED
     assert (fix.x_m, fix.y_m) == pytest.approx(np.mean(places, axis=0), abs=1e-9)
     assert fix.heading_rad == pytest.approx(np.angle(np.sum(turns)), abs=1e-9)
-    median = tracker(replace(settings, takes_median=True)).solve(spots_at(spot_px))
+    median = tracker(settings.model_copy(update={"takes_median": True})).solve(spots_at(spot_px))
     assert (median.x_m, median.y_m) == pytest.approx(np.median(places, axis=0), abs=1e-9)
     assert abs(median.x_m - fix.x_m) > 1e-5
 
@@ -211,12 +214,12 @@ def test_a_catalogue_without_a_triangle_is_refused():
 def test_the_tree_finds_what_the_scan_finds():
     rng = np.random.default_rng(3)
     stars = rng.uniform(-2.0, 2.0, (60, 2))
-    settings = PublishedSettings(angle_limit_rad=np.deg2rad(4.0))
+    settings = PublishedSettings(angle_limit_deg=4.0)
     for pose in rng.uniform(-0.5, 0.5, (5, 3)):
         inside = np.linalg.norm(stars - pose[:2], axis=1) < 1.1
         spots = spots_at(seen_from(*pose, stars[inside]) + rng.normal(0.0, 0.3, (inside.sum(), 2)))
         one = tracker(settings, stars).solve(spots)
-        other = tracker(replace(settings, uses_tree=True), stars).solve(spots)
+        other = tracker(settings.model_copy(update={"uses_tree": True}), stars).solve(spots)
         assert (one.x_m, one.y_m, one.heading_rad) == (other.x_m, other.y_m, other.heading_rad)
 
 
@@ -226,10 +229,10 @@ def test_mirrored_and_stretched_maps_count_unless_only_similar_ones_shall():
     mirrored = spots_at(seen_from(0.5, 0.4, 0.0) * (1.0, -1.0) + (0.0, 480.0))
     fix = tracker().solve(mirrored)
     assert (fix.x_m, fix.y_m) == pytest.approx((0.5, 0.4), abs=1e-9)
-    assert isinstance(tracker(replace(EXACT, only_similar=True)).solve(mirrored), NoFix)
+    assert isinstance(tracker(EXACT.model_copy(update={"only_similar": True})).solve(mirrored), NoFix)
 
 
-@pytest.mark.parametrize("changes", [{"angle_limit_rad": 0.0}, {"closeness_m": float("inf")}])
+@pytest.mark.parametrize("changes", [{"angle_limit_deg": 0.0}, {"closeness_m": float("inf")}])
 def test_limits_that_are_none_are_refused(changes):
     with pytest.raises(ValueError, match=next(iter(changes))):
         PublishedSettings(**changes)
