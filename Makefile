@@ -3,6 +3,7 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 CORE := .venv/.core
 PEERS := .venv/.peers
+EXTRAS := .venv/.extras
 
 .PHONY: run test test-all check bench bench-full mutate clean zig
 .DEFAULT_GOAL := help
@@ -36,14 +37,19 @@ $(CORE): $(STAMP) groundstation/core/build.py groundstation/core/sources.py $(wi
 run: $(CORE)
 	@$(BIN)/groundstation run examples/rigs/two_mock_ups.toml
 
-test: $(CORE)
+$(EXTRAS): tools/requirements-tests.lock | $(STAMP)
+	@echo "Installing what tests and documentation need (once) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/requirements-tests.lock
+	@touch $(EXTRAS)
+
+test: $(CORE) $(EXTRAS)
 	@$(BIN)/python -m pytest -q -n 2
 
-test-all: $(CORE)
+test-all: $(CORE) $(EXTRAS)
 	@$(BIN)/python -m pytest -q -n 2 -m "not hardware" --ignore tests/closed_loop/live
 	@$(BIN)/python -m pytest -q -m "not hardware" tests/closed_loop/live
 
-check: $(CORE)
+check: $(CORE) $(EXTRAS)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
