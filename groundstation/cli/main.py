@@ -22,6 +22,7 @@ COMMANDS: dict[str, Row] = {
     "replay": Command(
         "groundstation.cli.replay:app", "Feed a recording through the nodes again and compare."
     ),
+    "console": Command("groundstation.cli.console:app", "Look at a recording in the web console."),
     "recording": Command("groundstation.cli.recording:app", "Look into recordings, recover a torn one."),
     "report": Command("groundstation.cli.report:app", "Draw the figures of a recording."),
     "request": Command(

@@ -7,6 +7,15 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.console_option import (
+    FIRST_PORT,
+    HOST,
+    Certificates,
+    ConsoleHost,
+    ConsolePort,
+    NoConsole,
+    attendants,
+)
 from groundstation.cli.live_view import run_live
 from groundstation.cli.run_files import check_recording, finished_files
 from groundstation.cli.run_progress import RunProgress
@@ -54,10 +63,15 @@ def run(
         int,
         typer.Option(help="Where programs outside reach it, on loopback; 0: a free port.", min=0, max=65535),
     ] = 0,
+    no_console: NoConsole = False,
+    console_host: ConsoleHost = HOST,
+    console_port: ConsolePort = FIRST_PORT,
+    console_certificates: Certificates = None,
 ) -> None:
     """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds; or a scenario until it is over.
 
-    On a terminal the space bar stops all vehicles, l lands them, q ends the run.
+    On a terminal the space bar stops all vehicles, l lands them, q ends the run. A web console is started
+    besides, and its address printed.
 
     Exit code 0; 1 where a fault landed a vehicle, or the recording could not be written to the end; 2 where
     the rig is wrong. What a person stops or lands is no fault. Of a scenario: 0 where all its limits held, 1
@@ -83,7 +97,8 @@ def run(
             raise UsageError("--hub-port goes with a rig: nobody commands a scenario from outside")
         from groundstation.cli.run_scenario import Asked, run_scenario
 
-        asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know)
+        beside = [] if lockstep else attendants(console_host, console_port, console_certificates, no_console)
+        asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know, tuple(beside))
         raise typer.Exit(run_scenario(made(content, file), asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
@@ -108,7 +123,8 @@ def run(
             with RunProgress(duration) as update:
                 faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
         else:
-            live = LiveRun(loaded, text, file, recording, hub_port=hub_port)
+            beside = attendants(console_host, console_port, console_certificates, no_console)
+            live = LiveRun(loaded, text, file, recording, hub_port=hub_port, attendants=beside)
             run_live(live, duration, headless=headless or not sys.stdout.isatty())
             faults, trouble = live.faults, live.launcher.recording_trouble
     finally:

@@ -12,6 +12,7 @@ from groundstation.cli.run_files import finished_files
 from groundstation.cli.run_progress import RunProgress
 from groundstation.declarations.errors import GroundStationError, NodeError, RigError, UsageError
 from groundstation.files.writing import check_folder
+from groundstation.launch.attendant import Attendant
 from groundstation.launch.live_run import LiveRun
 from groundstation.parts.scenario.messages import FAILED, RUNNING, WAITING, Marker, ScenarioStatus
 from groundstation.recording.errors import RecordingError
@@ -39,6 +40,7 @@ class Asked:
     compare: Path | None
     hardware: Path | None
     i_know: str | None
+    attendants: tuple[Attendant, ...] = ()
 
 
 def run_scenario(scenario: Scenario, asked: Asked) -> int:
@@ -167,6 +169,7 @@ def _fly_live(scenario: Scenario, asked: Asked, recording: Path) -> str:
         source_of(scenario.rig).path,
         recording,
         {ScenarioStatus.TOPIC.noun: watch.status, Marker.TOPIC.noun: watch.marker},
+        attendants=asked.attendants,
     )
     headless = asked.headless or not sys.stdout.isatty()
     run_live(watch.live, None, headless=headless, is_over=lambda: watch.is_over)

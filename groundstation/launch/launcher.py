@@ -10,7 +10,7 @@ import pickle
 import queue
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -21,8 +21,9 @@ from groundstation.declarations.names import LABORATORY, RECORDER
 from groundstation.declarations.node import COMMANDS
 from groundstation.declarations.request import Ack
 from groundstation.declarations.rig import STATION_CHANNEL, Rig
-from groundstation.launch import process, recorder
-from groundstation.launch.child import Child, start_python
+from groundstation.launch import attendant, process, recorder
+from groundstation.launch.attendant import Attendant
+from groundstation.launch.child import REFUSAL, Child, start_python
 from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.forking import share_one_arena
 from groundstation.launch.memory import claim_memory
@@ -35,6 +36,8 @@ from groundstation.rig.read import bytes_of
 LOOPBACK_S = 2.0
 START_S = 30.0
 """A process that is not ready by then never will be."""
+ATTENDED_S = 5.0
+"""Attendants start when the flight is ready, or at this time at the latest."""
 HOPELESS = 4  # restarts of a process that was never ready
 HUNG_S = 4.0
 """Processes publish a batch of the record stream ten times a second, be it empty; the recorder, once."""
@@ -56,6 +59,7 @@ class Launcher:
         recording: Where the recorder writes; None for no recording.
         say: Takes one line about what happens.
         hub_port: Of the hub on loopback; 0 for a free one.
+        attendants: Processes beside the rig's; no flight waits for them.
 
     Raises:
         RigError: The rig names a laboratory that is not installed.
@@ -70,6 +74,7 @@ class Launcher:
         say: Say,
         *,
         hub_port: int = 0,
+        attendants: Iterable[Attendant] = (),
     ) -> None:
         self._rig_path = rig_path
         self._rig_text = rig_text
@@ -82,6 +87,8 @@ class Launcher:
         self._children = {name: Child(name) for name in processes_of(rig)}
         if recording is not None:
             self._children = {RECORDER: Child(RECORDER), **self._children}
+        self._attendants = {row.name: row for row in attendants}
+        self._children |= {name: Child(name) for name in self._attendants}
         self._laboratory: Child | None = None
         if rig.laboratory is not None:
             self._laboratory = Child(LABORATORY)
@@ -114,13 +121,15 @@ class Launcher:
 
     @property
     def is_ready(self) -> bool:
-        """Whether every process runs."""
-        return all(child.is_ready for child in self.children)
+        """Whether every process runs that a flight needs."""
+        return not self.waiting_for
 
     @property
     def waiting_for(self) -> list[str]:
-        """Names of the processes that are not ready."""
-        return [child.name for child in self.children if not child.is_ready]
+        """Names of the processes that are not ready, attendants left out."""
+        return [
+            child.name for child in self.children if not child.is_ready and child.name not in self._attendants
+        ]
 
     @property
     def recording_trouble(self) -> str:
@@ -150,7 +159,8 @@ class Launcher:
         for child in self.children:
             for line in child.complaints():
                 self._say(f"{child.name}: {line}")
-            _raise_refusal(child)
+            if child.name not in self._attendants:
+                _raise_refusal(child)
         now_s = time.monotonic()
         self._time.step(now_s)
         if self._fork_server.keep():
@@ -158,12 +168,18 @@ class Launcher:
         if self._laboratory is not None:
             self._look_after_laboratory(self._laboratory, now_s)
         if self._unstarted and self._fork_server.is_loaded:
-            for child in self._unstarted:
-                self._start(child)
-            self._unstarted.clear()
+            self._start_waiting()
         self._let_go()
-        for child in self._children.values():
+        for child in list(self._children.values()):
             self._look_after(child, now_s)
+
+    def _start_waiting(self) -> None:
+        """Start the rig's processes; attendants, which load much, once those have what they need."""
+        is_time = self.is_ready or time.monotonic() - self._began_s > ATTENDED_S
+        going = [child for child in self._unstarted if is_time or child.name not in self._attendants]
+        for child in going:
+            self._start(child)
+        self._unstarted = [child for child in self._unstarted if child not in going]
 
     def _look_after_laboratory(self, laboratory: Child, now_s: float) -> None:
         if laboratory.restart_at_s is not None:
@@ -191,7 +207,8 @@ class Launcher:
 
     def _of_the_laboratory(self) -> list[Child]:
         """The processes that end and begin with it."""
-        return [child for child in self._children.values() if child.name != RECORDER]
+        apart = {RECORDER, *self._attendants}
+        return [child for child in self._children.values() if child.name not in apart]
 
     def _have_the_others_ended(self, due_s: float, now_s: float) -> bool:
         """Whether the laboratory may start again; who has not ended well after it was due is killed."""
@@ -219,16 +236,21 @@ class Launcher:
             raise GroundStationError(f"the laboratory has not announced its ports for {START_S:g} s")
 
     def _look_after(self, child: Child, now_s: float) -> None:
-        if child.pid is None or (child.name != RECORDER and self._addresses is None):
+        is_apart = child.name == RECORDER or child.name in self._attendants
+        if child.pid is None or (not is_apart and self._addresses is None):
             return  # it waits for the fork server or the laboratory
         if child.restart_at_s is not None:
             if now_s >= child.restart_at_s and self._fork_server.is_loaded:
                 child.restarts += 1
                 self._start(child)
+        elif child.name in self._attendants and child.code == REFUSAL:
+            self._say(f"{child.name} is given up: it {child.how_it_ended()}")
+            del self._children[child.name]
         elif child.has_ended:
-            _raise_refusal(child)
+            if child.name not in self._attendants:
+                _raise_refusal(child)
             how = child.how_it_ended()
-            if child.restarts >= HOPELESS and not child.has_been_ready:
+            if child.name not in self._attendants and child.restarts >= HOPELESS and not child.has_been_ready:
                 raise GroundStationError(
                     f"{child.name} was started {child.restarts + 1} times in vain: it {how}"
                 )
@@ -254,10 +276,15 @@ class Launcher:
             restarts=child.restarts,
             utc_offset_ns=time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns(),
             sequences_after=round(elapsed_s * SEQUENCES_PER_S) if child.restarts else 0,
+            attendant=self._attendants.get(child.name),
         )
-        target = recorder.main if child.name == RECORDER else process.main
+        target = process.main
+        if child.name == RECORDER:
+            target = recorder.main
+        elif orders.attendant is not None:
+            target = attendant.run
         child.adopt(self._fork_server.fork(child.name, target, orders), self._time.now_s)
-        if child.name != RECORDER:
+        if target is process.main:
             self._waiting.add(child.name)
 
     def _let_go(self) -> None:
@@ -287,7 +314,7 @@ class Launcher:
         if commands is not None:
             commands.ask_to_end()
             commands.wait(begin_s + STOP_COMMANDS_S)
-        nodes = [child for child in self._children.values() if child.name != RECORDER]
+        nodes = [child for child in self._children.values() if child.name not in (RECORDER, *self._attendants)]
         last = [child for child in self.children if child not in nodes]
         for group, within_s in ((nodes, STOP_NODES_S), (last, STOP_ALL_S)):
             for child in group:

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -13,6 +13,7 @@ from groundstation.bus.zenoh_bus import RECORD, Mailbox, split_key
 from groundstation.declarations.errors import GroundStationError
 from groundstation.declarations.names import LAUNCHER
 from groundstation.declarations.rig import Rig
+from groundstation.launch.attendant import Attendant
 from groundstation.launch.launcher import START_S, Launcher
 from groundstation.launch.running import RunningRig
 from groundstation.launch.running_time import RunningTime
@@ -40,6 +41,7 @@ class LiveRun:
         recording: Where the recorder writes.
         watchers: By noun: take the messages of a topic besides, encoded.
         hub_port: Of the hub on loopback; 0 for a free one.
+        attendants: Processes beside the rig's.
     """
 
     def __init__(
@@ -50,11 +52,20 @@ class LiveRun:
         recording: Path,
         watchers: Mapping[str, Callable[[Recorded], None]] = MappingProxyType({}),
         hub_port: int = 0,
+        attendants: Iterable[Attendant] = (),
     ) -> None:
         self.rig = rig
         self.recording = recording
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
-        self.launcher = Launcher(rig, rig_text, rig_path, recording, self.monitor.note, hub_port=hub_port)
+        self.launcher = Launcher(
+            rig,
+            rig_text,
+            rig_path,
+            recording,
+            self.monitor.note,
+            hub_port=hub_port,
+            attendants=attendants,
+        )
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
         self._watchers = watchers

@@ -5,8 +5,12 @@ After that stdin stays open for as long as the launcher lives: its end means tha
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Optional
 
 from drivers.laboratory import Address
+
+if TYPE_CHECKING:
+    from groundstation.launch.attendant import Attendant
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,7 @@ class Orders:
         restarts: How often the process was started before: a recorder then writes a file of its own.
         utc_offset_ns: UTC minus monotonic clock; used by the recorder.
         sequences_after: Sequence numbers begin after this one.
+        attendant: What the process is beside the rig's own; None for those.
     """
 
     process: str
@@ -35,6 +40,7 @@ class Orders:
     restarts: int = 0
     utc_offset_ns: int = 0
     sequences_after: int = 0
+    attendant: Optional["Attendant"] = None
 
 
 @dataclass(frozen=True)

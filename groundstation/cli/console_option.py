@@ -1,0 +1,92 @@
+"""Options of ``run`` that are about the console, and the address that it prints."""
+
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from groundstation.console.access import LOOPBACK, Access, new_token
+from groundstation.console.options import attendant
+from groundstation.declarations.errors import UsageError
+from groundstation.launch.attendant import Attendant
+
+FIRST_PORT, PORTS_TRIED = 8400, 100
+
+NoConsole = Annotated[bool, typer.Option("--no-console", help="Start no web console.")]
+ConsoleHost = Annotated[
+    str,
+    typer.Option(
+        "--console-host",
+        help="Address of this machine at which a network reaches the console; wants --console-certificates.",
+    ),
+]
+ConsolePort = Annotated[
+    int, typer.Option("--console-port", help="The next free one if it is taken.", min=1, max=65535)
+]
+Certificates = Annotated[
+    Path | None,
+    typer.Option("--console-certificates", help="Folder that `groundstation certificates` made."),
+]
+HOST = "127.0.0.1"
+
+
+def console_access(host: str, port: int, certificates: Path | None) -> Access:
+    """How the console of a run is reached.
+
+    Raises:
+        UsageError: A network is to reach it without certificates, or no port is free.
+    """
+    if certificates is None:
+        access = Access(host, _free(host, port))
+    else:
+        pair = [certificates / name for name in ("server.pem", "server.key")]
+        for file in pair:
+            if not file.is_file():
+                raise UsageError(
+                    f"{file} is not there: `groundstation certificates --out {certificates}` makes it"
+                )
+        observer, operator = new_token(), new_token()
+        access = Access(host, _free(host, port), (), observer, operator, *map(str, pair))
+    trouble = access.trouble()
+    if trouble:
+        raise UsageError(trouble)
+    return access
+
+
+def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:  # noqa: FBT001 an option
+    """The console beside a run, its address printed; nothing where none is wanted.
+
+    Raises:
+        UsageError: It cannot be opened so.
+    """
+    if no_console:
+        return []
+    access = console_access(host, port, certificates)
+    print_address(access)
+    return [attendant(access)]
+
+
+def print_address(access: Access) -> None:
+    """Print what people open."""
+    if not access.operator:
+        print(f"console: {access.address}", flush=True)
+        return
+    print(f"console: {access.address}?token={access.operator}", flush=True)
+    print(f"console, for those who look on: {access.address}?token={access.observer}", flush=True)
+
+
+def _free(host: str, first: int) -> int:
+    """The first port from here on that nobody listens at."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for port in range(first, min(first + PORTS_TRIED, 65536)):
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, port))
+            except OSError as error:
+                if host not in LOOPBACK and port == first and error.errno not in (98, 48, 13):
+                    raise UsageError(f"the console cannot listen at {host}: {error.strerror}") from error
+                continue
+            return port
+    raise UsageError(f"no port from {first} to {first + PORTS_TRIED - 1} is free for the console")

@@ -1,0 +1,241 @@
+"""The console over a recording: the same screens, with a time that a person moves."""
+
+import asyncio
+import time
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import uvicorn
+
+from groundstation.bus.fields import Field
+from groundstation.console.access import Access
+from groundstation.console.chart_tap import Samples, find_field
+from groundstation.console.events import Event, Events
+from groundstation.console.feed import Feed
+from groundstation.console.rig_page import rig_page
+from groundstation.console.server import Console, make_app
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
+from groundstation.declarations.topic import Recorded as Keeping
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.stars.messages import StarFix
+from groundstation.recording.columns import read_columns
+from groundstation.recording.reader import Recorded, Recording
+from groundstation.rig.provenance import recorded_rig
+
+BEFORE_NS = 1_500_000_000
+"""So far before a moment the messages are read that a screen shows there; what comes rarely is held in memory."""
+MOST_STEP_S = 0.5
+MOST_EVENTS, MOST_SHOWN = 1_000_000, 4000
+"""Of a recording; beyond the second a screen is told of no fix that was used."""
+MOST_SAMPLES = 20_000
+"""Of a field over the whole recording."""
+RARE_HZ = 1.0
+_S = 1_000_000_000
+
+
+class ReplaySource:
+    """A recording, and where in it a person looks.
+
+    Args:
+        recording: Open for as long as this lives.
+        rig: As it was recorded.
+        other: A recording that is laid over it, from its beginning; None for none.
+    """
+
+    def __init__(self, recording: Recording, rig: Rig, other: Recording | None = None) -> None:
+        self._recording = recording
+        self._payloads = rig.tables.payloads
+        self.vehicles = tuple(rig.vehicles)
+        self.feed = Feed(self._payloads)
+        self._listening = Feed(self._payloads)
+        self.events = Events(self._listening, MOST_EVENTS)
+        self._rare = self._read_rare()
+        self._rare_ns = [message.log_ns for message in self._rare]
+        self._all_events: list[Event] = list(self.events.kept)
+        if len(self._all_events) > MOST_SHOWN:
+            self.events.keep(lambda event: event["kind"] != "fix" or not event["used"])
+        self._ghosts = {} if other is None else _tracks(other, self.vehicles)
+        self._place_ns = recording.start_ns
+        self._factor, self._is_playing = 1.0, False
+        self._looked_s = time.monotonic()
+        self.page: dict[str, Any] = {
+            **rig_page(rig),
+            "kind": "replay",
+            "replay": {
+                "path": str(recording.path),
+                "start_s": recording.start_ns * 1e-9,
+                "duration_s": (recording.stop_ns - recording.start_ns) * 1e-9,
+                "other": "" if other is None else str(other.path),
+            },
+        }
+        self._seek(recording.start_ns + BEFORE_NS)
+
+    @property
+    def place_s(self) -> float:
+        """Where it is, from the beginning of the recording."""
+        return (self._place_ns - self._recording.start_ns) * 1e-9
+
+    def step(self) -> int:
+        """Go on by the time since the last step, if it plays."""
+        now_s = time.monotonic()
+        passed_s, self._looked_s = min(now_s - self._looked_s, MOST_STEP_S), now_s
+        if self._is_playing:
+            until_ns = self._place_ns + round(passed_s * self._factor * 1e9)
+            self._read(self._place_ns + 1, until_ns)
+            self._place_ns = min(until_ns, self._recording.stop_ns)
+            self._is_playing = self._place_ns < self._recording.stop_ns
+        return self._place_ns
+
+    def extra(self) -> dict[str, Any]:
+        """Where it is; the vehicles of the other recording at the same time from its beginning."""
+        found: dict[str, Any] = {
+            "replay": {"t_s": self.place_s, "is_playing": self._is_playing, "factor": self._factor}
+        }
+        if self._ghosts:
+            found["ghosts"] = {name: _at(track, self.place_s) for name, track in self._ghosts.items()}
+        return found
+
+    def control(self, asked: Mapping[str, Any]) -> None:
+        """Do what a person asks for.
+
+        Raises:
+            ValueError: It is nothing that can be asked for.
+        """
+        what = asked.get("what")
+        if what == "play":
+            if self._place_ns >= self._recording.stop_ns:
+                self._seek(self._recording.start_ns)
+            self._is_playing = True
+        elif what == "pause":
+            self._is_playing = False
+        elif what == "speed":
+            self._factor = min(max(float(asked["factor"]), 0.01), 100.0)
+        elif what == "seek":
+            self._seek(self._recording.start_ns + round(float(asked["t_s"]) * 1e9))
+        elif what in ("next_fault", "next_refused"):
+            self._jump(what)
+        else:
+            raise ValueError(f"{what!r:.40} is nothing that a recording can do")
+
+    def columns(self, names: Iterable[str]) -> dict[str, Samples]:
+        """Whole columns of fields, for charts: times (s) and values; may be called from another thread.
+
+        Raises:
+            UnknownFieldError: There is no such field.
+            RecordingError: The recording cannot be read.
+        """
+        fields = {name: find_field(name, self._payloads) for name in names}
+        wanted: dict[type[Message], set[str]] = {}
+        for field in fields.values():
+            wanted.setdefault(self._payloads[field.noun], set()).add(field.name)
+        with Recording(self._recording.path) as own:
+            found = read_columns(own, wanted) if wanted else {}
+        return {name: _column(found, field, self._payloads) for name, field in fields.items()}
+
+    def close(self) -> None:
+        self._recording.close()
+
+    def _jump(self, what: str) -> None:
+        """To shortly before the next fault or refused fix."""
+        after_s = self._place_ns * 1e-9 + 0.25
+        for event in self._all_events:
+            is_wanted = (
+                event["kind"] == "fault"
+                if what == "next_fault"
+                else event["kind"] == "fix" and not event["used"]
+            )
+            if is_wanted and event["t_s"] > after_s:
+                self._seek(round(event["t_s"] * 1e9))
+                return
+
+    def _seek(self, place_ns: int) -> None:
+        place_ns = min(max(place_ns, self._recording.start_ns), self._recording.stop_ns)
+        self.feed.forget()
+        for message in self._rare[: bisect_right(self._rare_ns, place_ns)]:
+            self._take(message)
+        self._read(place_ns - BEFORE_NS, place_ns)
+        self._place_ns = place_ns
+
+    def _read(self, start_ns: int, stop_ns: int) -> None:
+        """Take the messages of a span, its end included."""
+        for message in self._recording.messages(self._kinds(), None, start_ns, stop_ns + 1):
+            self._take(message)
+
+    def _kinds(self) -> list[type[Message]]:
+        return [kind for kind in self._payloads.values() if kind.TOPIC.recorded is not Keeping.IMAGES]
+
+    def _take(self, message: Recorded) -> None:
+        topic, owner = message.envelope.topic, message.envelope.owner
+        self.feed.take_one((topic.noun, owner), message.data, message.log_ns)
+
+    def _read_rare(self) -> list[Recorded]:
+        """What comes seldom, and all that makes events: held in memory, a screen wants the last of it."""
+        rare = [kind for kind in self._kinds() if kind.TOPIC.latched or kind.TOPIC.rate_hz < RARE_HZ]
+        listened = [kind for kind in self._kinds() if self._listening.is_taken(kind)]
+        found = []
+        kinds = {*rare, *listened, VehicleState, StarFix} - {kind for kind in rare if kind.TOPIC.noun == "journal"}
+        for message in self._recording.messages(list(kinds)):
+            key = (message.envelope.topic.noun, message.envelope.owner)
+            self._listening.take_one(key, message.data, message.log_ns)
+            if self._payloads[key[0]] in rare:
+                found.append(message)
+        return found
+
+
+def _column(
+    found: Mapping[Any, Any], field: Field, payloads: Mapping[str, type[Message]]
+) -> Samples:
+    columns = found.get((payloads[field.noun], field.owner))
+    if columns is None:
+        return np.empty(0), np.empty(0)
+    values = columns[field.name]
+    if field.place is not None:
+        values = values[:, field.place]
+    step = max(1, len(values) // MOST_SAMPLES)
+    return (columns.stamp_ns * 1e-9)[::step], values[::step].astype(np.float64)
+
+
+def _tracks(recording: Recording, vehicles: tuple[str, ...]) -> dict[str, Any]:
+    """Poses of each vehicle: t from the beginning (s), x, y (m), heading (rad)."""
+    found = read_columns(recording, {VehicleState: ("position_table_m", "heading_rad")})
+    tracks = {}
+    for (_, owner), columns in found.items():
+        if owner in vehicles and len(columns):
+            times_s = (columns.stamp_ns - recording.start_ns) / _S
+            tracks[owner] = np.column_stack((times_s, columns["position_table_m"], columns["heading_rad"]))
+    return tracks
+
+
+def _at(track: Any, t_s: float) -> list[float]:  # noqa: ANN401 an array of four columns
+    place = min(int(np.searchsorted(track[:, 0], t_s)), len(track) - 1)
+    return [float(value) for value in track[place, 1:]]
+
+
+def serve(path: Path, other: Path | None, access: Access) -> None:
+    """Serve a recording until Ctrl-C.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+    recording = Recording(path)
+    rig = recorded_rig(recording)
+    source = ReplaySource(recording, rig, None if other is None else Recording(other))
+    console = Console(source, rig.tables, access)
+    config = uvicorn.Config(
+        make_app(console),
+        host=access.host,
+        port=access.port,
+        log_level="warning",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=1,
+    )
+    try:
+        asyncio.run(uvicorn.Server(config).serve())
+    finally:
+        source.close()

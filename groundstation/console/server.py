@@ -1,0 +1,326 @@
+"""HTTP and WebSocket around the screens: pages, ``/api/``, and one socket each."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from importlib.resources import files
+from typing import Any
+
+from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import JSONResponse, Response
+
+from groundstation.bus.fields import fields_of
+from groundstation.console.access import COOKIE, Access, Role
+from groundstation.console.chart_tap import UnknownFieldError
+from groundstation.console.desk import Desk, LeaseOffice, NotAllowedError, body_of
+from groundstation.console.hall import Hall, Screen
+from groundstation.console.source import Source
+from groundstation.console.wire import json_frame, plain
+from groundstation.declarations.request import ArgumentError
+from groundstation.declarations.tables import Tables
+
+PAGE = files("groundstation.console") / "page"
+TYPES = {
+    "html": "text/html; charset=utf-8",
+    "css": "text/css; charset=utf-8",
+    "js": "text/javascript; charset=utf-8",
+    "svg": "image/svg+xml",
+    "txt": "text/plain; charset=utf-8",
+}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+LONGEST_BODY = 100_000
+LEASE_S = 600.0
+HEADER = "x-lease-token"
+Preview = Callable[[str, str, dict[str, object]], Awaitable[dict[str, Any]]]
+
+
+class Console:
+    """Everything that one server serves.
+
+    Args:
+        source: What is shown.
+        tables: Of the rig.
+        access: How it is reached.
+        desk: Where requests are made; None where nothing can be asked for: a recording.
+        preview: Flies a request in virtual time; None where that cannot be.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        tables: Tables,
+        access: Access,
+        desk: Desk | None = None,
+        preview: Preview | None = None,
+    ) -> None:
+        self.source = source
+        self.tables = tables
+        self.access = access
+        self.desk = desk
+        self.preview = preview
+        self.hall = Hall(source, tables.payloads)
+        self.office = None if desk is None else LeaseOffice(desk, self._holder)
+
+    def _holder(self) -> str:
+        lease = self.hall.state().get("lease", {})
+        return str(lease.get("holder", "")) if lease.get("left_s", 0.0) > 0.0 else ""
+
+    def topics(self) -> list[dict[str, Any]]:
+        """Every topic of the tables that something came of, with its numbers."""
+        feed = self.source.feed
+        found = []
+        for noun, owner in sorted(feed.newest):
+            kind = self.tables.payloads.get(noun)
+            if kind is not None:
+                numbers = [str(field) for field in fields_of(kind, owner)]
+                found.append(
+                    {
+                        "topic": f"{owner or 'rig'}/{noun}",
+                        "type": kind.ROS_TYPE,
+                        "rate_hz": kind.TOPIC.rate_hz,
+                        "count": feed.counts[noun, owner],
+                        "fields": numbers,
+                    }
+                )
+        return found
+
+
+def make_app(console: Console) -> FastAPI:
+    """The application of a console."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        del app
+        running = asyncio.create_task(console.hall.run())
+        yield
+        running.cancel()
+
+    app = FastAPI(title="groundstation console", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
+    _guard(app, console)
+    _add_api(app, console)
+    _add_lease(app, console)
+    _add_pages(app, console)
+    app.add_api_websocket_route("/ws", _socket(console))
+    return app
+
+
+def _guard(app: FastAPI, console: Console) -> None:
+    """Refuse what is foreign, too long, or nobody's, before any route sees it."""
+    access = console.access
+
+    @app.middleware("http")
+    async def guard(request: Request, go_on: Callable[[Request], Awaitable[Response]]) -> Response:
+        headers = {name.lower(): value for name, value in request.headers.items()}
+        foreign = access.foreign(headers)
+        if foreign:
+            return _refused(403, foreign)
+        if int(headers.get("content-length") or 0) > LONGEST_BODY:
+            return _refused(413, f"a request has at most {LONGEST_BODY} bytes")
+        token = request.query_params.get("token", "")
+        role = access.role(headers, request.cookies.get(COOKIE, ""), token)
+        if role is Role.NOBODY:
+            return _refused(401, "this console wants a token: open the address that its run printed")
+        if request.method == "POST" and role < Role.OPERATOR and request.url.path != "/api/stop":
+            return _refused(403, "an observer may look on and press STOP; the operator's address may ask")
+        response = await go_on(request)
+        response.headers.update(HEADERS)
+        if token:
+            secure = access.scheme == "https"
+            response.set_cookie(COOKIE, token, httponly=True, samesite="strict", secure=secure)
+        return response
+
+
+def _add_api(app: FastAPI, console: Console) -> None:
+    hall = console.hall
+
+    @app.get("/api/state")
+    async def state() -> Response:
+        return JSONResponse(plain(hall.state()))
+
+    @app.get("/api/rig")
+    async def rig() -> Response:
+        return JSONResponse(plain(console.source.page))
+
+    @app.get("/api/topics")
+    async def topics() -> Response:
+        return JSONResponse(console.topics())
+
+    @app.post("/api/stop")
+    async def stop(request: Request) -> Response:
+        if console.desk is None:
+            return _refused(409, "this is a recording: there is nothing to stop")
+        try:
+            vehicle = str(body_of(await request.body()).get("vehicle") or "")
+        except ValueError:
+            vehicle = ""  # whatever was posted, it was a press
+        if vehicle not in console.source.vehicles:
+            vehicle = ""
+        outcome = await console.desk.press(vehicle, "console")
+        return JSONResponse({"accepted": not outcome["not_confirmed"], **outcome})
+
+    @app.post("/api/request")
+    async def ask(request: Request) -> Response:
+        if console.desk is None or console.office is None:
+            return _refused(409, "this is a recording: nothing can be asked for")
+        try:
+            body = body_of(await request.body())
+            vehicle, action = str(body.get("vehicle", "")), str(body.get("action", ""))
+            arguments = body.get("arguments") or {}
+            if not isinstance(arguments, dict):
+                raise ValueError("'arguments' is no JSON object")
+            author = console.office.author(action, _token(request, body))
+            if action == "stop":
+                outcome = await console.desk.press(vehicle, author)
+                return JSONResponse({"accepted": not outcome["not_confirmed"], "reason": "", **outcome})
+            accepted, reason = await console.desk.request(vehicle, action, arguments, author)
+        except (ValueError, ArgumentError) as error:
+            return _refused(400, str(error))
+        except NotAllowedError as error:
+            return _refused(403, str(error))
+        return JSONResponse({"accepted": accepted, "reason": reason}, 200 if accepted else 409)
+
+    @app.post("/api/marker")
+    async def mark(request: Request) -> Response:
+        if console.desk is None:
+            return _refused(409, "this is a recording: it takes no more notes")
+        try:
+            console.desk.mark(str(body_of(await request.body()).get("text") or ""))
+        except (ValueError, ArgumentError) as error:
+            return _refused(400, str(error))
+        return JSONResponse({"accepted": True, "reason": ""})
+
+    @app.post("/api/preview")
+    async def preview(request: Request) -> Response:
+        if console.preview is None:
+            return _refused(409, "this rig cannot be flown in virtual time: it has no emulated twin")
+        try:
+            body = body_of(await request.body())
+            arguments = body.get("arguments") or {}
+            if not isinstance(arguments, dict):
+                raise ValueError("'arguments' is no JSON object")
+            shown = await console.preview(str(body.get("vehicle", "")), str(body.get("action", "")), arguments)
+        except (ValueError, ArgumentError) as error:
+            return _refused(400, str(error))
+        return JSONResponse(plain(shown))
+
+
+def _add_lease(app: FastAPI, console: Console) -> None:
+    @app.post("/api/lease")
+    async def lease(request: Request) -> Response:
+        office = console.office
+        if office is None:
+            return _refused(409, "this is a recording: there is no control to take")
+        try:
+            body = body_of(await request.body())
+            token = _token(request, body)
+            action = str(body.get("action", "take")).replace("-", "_").replace(" ", "_")
+            if action == "take":
+                name = str(body.get("name") or "").strip()
+                if not name:
+                    raise ValueError("taking control needs a name: {'action': 'take', 'name': …}")
+                for_s = body.get("for_s", LEASE_S)
+                if isinstance(for_s, bool) or not isinstance(for_s, int | float):
+                    raise ValueError(f"for_s is {for_s!r:.40}, expected seconds")
+                fresh = await office.take(name, token, float(for_s), str(body.get("force") or ""))
+                return JSONResponse({"accepted": True, "token": fresh, "holder": name})
+            if action in ("give_up", "give", "release"):
+                await office.give(token)
+                return JSONResponse({"accepted": True, "holder": ""})
+            if action in ("pass_on", "pass"):
+                to = str(body.get("to") or "").strip()
+                if not to:
+                    raise ValueError("passing control on needs 'to', a name")
+                await office.give(token, to)
+                return JSONResponse({"accepted": True, "holder": to})
+            raise ValueError(f"action is {action!r:.40}, expected take, give_up or pass_on")
+        except (ValueError, ArgumentError) as error:
+            return _refused(400, str(error))
+        except NotAllowedError as error:
+            return _refused(409, str(error))
+
+
+def _add_pages(app: FastAPI, console: Console) -> None:
+    del console
+    known = {
+        entry.name: entry.read_bytes()
+        for folder in (PAGE, PAGE / "vendor")
+        for entry in folder.iterdir()
+        if entry.is_file() and entry.name.rpartition(".")[2] in TYPES
+    }
+
+    @app.get("/")
+    async def index() -> Response:
+        return Response(known["index.html"], media_type=TYPES["html"])
+
+    @app.get("/page/{name}")
+    async def page(name: str) -> Response:
+        data = known.get(name)
+        if data is None:
+            return _refused(404, f"there is no page {name!r:.60}")
+        return Response(data, media_type=TYPES[name.rpartition(".")[2]])
+
+
+def _socket(console: Console) -> Callable[[WebSocket], Awaitable[None]]:
+    async def serve(socket: WebSocket) -> None:
+        headers = {name.lower(): value for name, value in socket.headers.items()}
+        role = console.access.role(
+            headers, socket.cookies.get(COOKIE, ""), socket.query_params.get("token", "")
+        )
+        if console.access.foreign(headers) or role is Role.NOBODY:
+            await socket.close(4401)
+            return
+        await socket.accept()
+        screen = Screen(socket, may_command=role is Role.OPERATOR and console.desk is not None)
+        console.hall.enter(screen)
+        sending = asyncio.create_task(screen.client.send())
+        try:
+            with suppress(WebSocketDisconnect, KeyError):  # the screen is gone, or sends what is no text
+                while True:
+                    _obey(console, screen, await socket.receive_text())
+        finally:
+            sending.cancel()
+            console.hall.leave(screen)
+
+    return serve
+
+
+def _obey(console: Console, screen: Screen, text: str) -> None:
+    """Do what a screen asks for."""
+    try:
+        asked = json.loads(text[:LONGEST_BODY])
+        what = asked["type"]
+        if what == "stop":
+            if console.desk is not None:
+                vehicle = str(asked.get("vehicle") or "")
+                console.desk.press(vehicle if vehicle in console.source.vehicles else "", "console")
+        elif what == "charts":
+            console.hall.show_charts(screen, tuple(str(name) for name in asked["fields"]))
+        elif what == "camera":
+            vehicle = str(asked.get("vehicle") or "")
+            screen.camera = vehicle if vehicle in console.source.vehicles else ""
+        elif what == "ping":
+            screen.client.append(json_frame({"type": "pong", "at": asked.get("at")}))
+        elif what == "replay":
+            console.source.control(asked)
+        else:
+            raise ValueError(f"{what!r:.40} is nothing that a screen can ask for")
+    except UnknownFieldError as error:
+        screen.client.append(json_frame({"type": "trouble", "text": str(error)}))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        screen.client.append(json_frame({"type": "trouble", "text": f"not understood: {error}"}))
+
+
+def _token(request: Request, body: dict[str, object]) -> str:
+    """The lease's token: in the body, or in a header."""
+    return str(body.get("token") or request.headers.get(HEADER) or "")
+
+
+def _refused(status: int, reason: str) -> Response:
+    return JSONResponse({"accepted": False, "reason": reason}, status, headers=HEADERS)
