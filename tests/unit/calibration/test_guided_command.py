@@ -1,7 +1,7 @@
 import pytest
 
-from calibration.wizards import load_wizard
 from groundstation.declarations.errors import UsageError
+from groundstation.launch.guided import load_wizard
 
 RIG = "examples/rigs/drawn_fixes.toml"
 
