@@ -54,7 +54,7 @@ def console_access(host: str, port: int, certificates: Path | None) -> Access:
     return access
 
 
-def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:  # noqa: FBT001 an option
+def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:
     """The console beside a run, its address printed; nothing where none is wanted.
 
     Raises:

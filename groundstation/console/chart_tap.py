@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from groundstation.bus.cdr import CodecError
 from groundstation.bus.cdr_columns import decode_columns
-from groundstation.console.feed import Key
 from groundstation.bus.fields import Field, fields_of
+from groundstation.console.feed import Key
 from groundstation.declarations.message import Message
 
 MOST_SAMPLES = 40_000
@@ -58,7 +58,7 @@ class ChartTap:
             )
         except CodecError:
             return  # the feed counts what cannot be read
-        times_s = columns.stamp_ns * 1e-9
+        times_s = columns.stamp_ns.astype(np.float64) * 1e-9
         for name, field in wanted:
             values = columns[field.name]
             if field.place is not None:

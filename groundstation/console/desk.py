@@ -25,6 +25,7 @@ from groundstation.launch.stop_button import EVERY, REPEAT_S, StopButton
 from groundstation.parts.scenario.messages import Marker
 
 ANSWER_S = 3.0
+MOST_TAPS = 200
 RIG = ""
 """Whom requests concern that are the rig's: the lease."""
 Ask = Callable[[str, str, Mapping[str, Value], str], "asyncio.Future[Ack]"]
@@ -85,6 +86,7 @@ class Desk:
         self._loop = asyncio.get_running_loop()
         self._button = StopButton(stop_bus, vehicles, "console")
         self._following: asyncio.Task[None] | None = None
+        self._taps: dict[str, asyncio.Task[dict[str, object]]] = {}
         bus.subscribe(key_of(Ack.TOPIC, "*"), self._receive)
 
     async def request(
@@ -107,9 +109,16 @@ class Desk:
         request = requests_of((vehicle,), action, given, checked_name(author))[0]
         return await self._answered(request)
 
-    def press(self, vehicle: str, author: str) -> "asyncio.Task[dict[str, object]]":
-        """Press the stop, now; what became of it is the task's result."""
-        del author  # a press is anybody's
+    def press(self, vehicle: str, tap: str = "") -> "asyncio.Task[dict[str, object]]":
+        """Press the stop, now; what became of it is the task's result.
+
+        Args:
+            vehicle: Whom to stop; empty for all.
+            tap: Of a screen that sends the same tap by two ways: it is one press. Empty: each call is one.
+        """
+        known = self._taps.get(tap) if tap else None
+        if known is not None:
+            return known
         press = self._button.press(vehicle or EVERY, ANSWER_S)
         if self._following is None or self._following.done():
             self._following = asyncio.create_task(self._follow())
@@ -118,11 +127,17 @@ class Desk:
         async def result() -> dict[str, object]:
             await asyncio.shield(following)
             return {
+                "accepted": not press.waiting,
                 "stopped": {name: ruling.mode for name, ruling in press.stopped.items()},
                 "not_confirmed": sorted(press.waiting),
             }
 
-        return asyncio.create_task(result())
+        task = asyncio.create_task(result())
+        if tap:
+            self._taps[tap] = task
+            if len(self._taps) > MOST_TAPS:
+                del self._taps[next(iter(self._taps))]
+        return task
 
     def mark(self, text: str) -> None:
         """Publish a marker: a note at this moment, for the recording.

@@ -97,7 +97,7 @@ def _duration_s(question: Question) -> float:
 
 
 def _path(flown: RunTracks, name: str) -> list[list[float]]:
-    """t (s), x, y (m), heading (rad), a few times a second."""
+    """T (s), x, y (m), heading (rad), a few times a second."""
     truth = flown.tracks[name].truth
     if not len(truth):
         return []

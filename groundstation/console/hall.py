@@ -127,6 +127,11 @@ class Hall:
             due_s = max(due_s + STEP_S, loop.time())
             await asyncio.sleep(due_s - loop.time())
 
+    def look(self) -> dict[str, Any]:
+        """The state as it is at this moment."""
+        self.now_ns = self._source.step()
+        return self.state()
+
     def step(self) -> None:
         """Take what has come, and show it."""
         self.now_ns = self._source.step()
@@ -167,7 +172,9 @@ class Hall:
         if picture.stamp_ns == screen.picture_ns:
             return
         screen.picture_ns = picture.stamp_ns
-        screen.client.show("picture", picture_frame(_picture_head(screen.camera, matches, picture), picture.data))
+        screen.client.show(
+            "picture", picture_frame(_picture_head(screen.camera, matches, picture), picture.data)
+        )
 
     def _health(self) -> dict[str, Any]:
         """Nodes, rates, ages: once a second."""

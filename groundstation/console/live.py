@@ -88,9 +88,7 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
     source = LiveSource(rig, bus)
     desk = Desk(bus, stop_bus, source.vehicles, rig.tables.actions, Tokens(options.secret))
     ahead = FlownAhead(rig, source.feed, orders)
-    console = Console(
-        source, rig.tables, options.access, desk, ahead.fly if ahead.can_fly else None
-    )
+    console = Console(source, rig.tables, options.access, desk, ahead.fly if ahead.can_fly else None)
     console.lead(
         Wizards(
             rig, orders.rig_text, orders.rig_path.name, source.feed, desk, console.holder, console.hall.tell
@@ -116,10 +114,13 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
     )
     loop = asyncio.get_running_loop()
 
-    def stop() -> None:
+    def end() -> None:
         server.should_exit = True
 
-    stop_when_asked(lambda: loop.call_soon_threadsafe(stop))
+    def stop() -> None:
+        loop.call_soon_threadsafe(end)
+
+    stop_when_asked(stop)
     server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]  # the launcher asks
     tasks = [
         asyncio.create_task(_report_life(bus, orders.process)),

@@ -27,7 +27,7 @@ from groundstation.recording.reader import Recorded, Recording
 from groundstation.rig.provenance import recorded_rig
 
 BEFORE_NS = 1_500_000_000
-"""So far before a moment the messages are read that a screen shows there; what comes rarely is held in memory."""
+"""So far before a moment messages are read that a screen shows there; what comes rarely is in memory."""
 MOST_STEP_S = 0.5
 MOST_EVENTS, MOST_SHOWN = 1_000_000, 4000
 """Of a recording; beyond the second a screen is told of no fix that was used."""
@@ -53,6 +53,7 @@ class ReplaySource:
         self.feed = Feed(self._payloads)
         self._listening = Feed(self._payloads)
         self.events = Events(self._listening, MOST_EVENTS)
+        self._first_ns = 0
         self._rare = self._read_rare()
         self._rare_ns = [message.log_ns for message in self._rare]
         self._all_events: list[Event] = list(self.events.kept)
@@ -72,7 +73,7 @@ class ReplaySource:
                 "other": "" if other is None else str(other.path),
             },
         }
-        self._seek(recording.start_ns + BEFORE_NS)
+        self._seek(self._first_ns)
 
     @property
     def place_s(self) -> float:
@@ -177,18 +178,20 @@ class ReplaySource:
         rare = [kind for kind in self._kinds() if kind.TOPIC.latched or kind.TOPIC.rate_hz < RARE_HZ]
         listened = [kind for kind in self._kinds() if self._listening.is_taken(kind)]
         found = []
-        kinds = {*rare, *listened, VehicleState, StarFix} - {kind for kind in rare if kind.TOPIC.noun == "journal"}
+        kinds = {*rare, *listened, VehicleState, StarFix} - {
+            kind for kind in rare if kind.TOPIC.noun == "journal"
+        }
         for message in self._recording.messages(list(kinds)):
             key = (message.envelope.topic.noun, message.envelope.owner)
             self._listening.take_one(key, message.data, message.log_ns)
+            if key[0] == VehicleState.TOPIC.noun and not self._first_ns:
+                self._first_ns = message.log_ns
             if self._payloads[key[0]] in rare:
                 found.append(message)
         return found
 
 
-def _column(
-    found: Mapping[Any, Any], field: Field, payloads: Mapping[str, type[Message]]
-) -> Samples:
+def _column(found: Mapping[Any, Any], field: Field, payloads: Mapping[str, type[Message]]) -> Samples:
     columns = found.get((payloads[field.noun], field.owner))
     if columns is None:
         return np.empty(0), np.empty(0)

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from importlib.resources import files
 from typing import Any
@@ -31,8 +31,8 @@ TYPES = {
     "txt": "text/plain; charset=utf-8",
 }
 HEADERS = {
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
-    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; "
+    "style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
@@ -78,7 +78,7 @@ class Console:
 
     def holder(self) -> str:
         """Who holds control now; empty for nobody."""
-        lease = self.hall.state().get("lease", {})
+        lease = self.hall.look().get("lease", {})
         return str(lease.get("holder", "")) if lease.get("left_s", 0.0) > 0.0 else ""
 
     def topics(self) -> list[dict[str, Any]]:
@@ -114,7 +114,9 @@ def make_app(console: Console) -> FastAPI:
         for task in running:
             task.cancel()
 
-    app = FastAPI(title="groundstation console", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
+    app = FastAPI(
+        title="groundstation console", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan
+    )
     _guard(app, console)
     _add_api(app, console)
     _add_lease(app, console)
@@ -155,7 +157,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
 
     @app.get("/api/state")
     async def state() -> Response:
-        return JSONResponse(plain(hall.state()))
+        return JSONResponse(plain(hall.look()))
 
     @app.get("/api/rig")
     async def rig() -> Response:
@@ -170,13 +172,10 @@ def _add_api(app: FastAPI, console: Console) -> None:
         if console.desk is None:
             return _refused(409, "this is a recording: there is nothing to stop")
         try:
-            vehicle = str(body_of(await request.body()).get("vehicle") or "")
+            body = body_of(await request.body())
         except ValueError:
-            vehicle = ""  # whatever was posted, it was a press
-        if vehicle not in console.source.vehicles:
-            vehicle = ""
-        outcome = await console.desk.press(vehicle, "console")
-        return JSONResponse({"accepted": not outcome["not_confirmed"], **outcome})
+            body = {}  # whatever was posted, it was a press
+        return JSONResponse(await _pressed(console, console.desk, body))
 
     @app.post("/api/request")
     async def ask(request: Request) -> Response:
@@ -190,8 +189,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
                 raise ValueError("'arguments' is no JSON object")
             author = console.office.author(action, _token(request, body))
             if action == "stop":
-                outcome = await console.desk.press(vehicle, author)
-                return JSONResponse({"accepted": not outcome["not_confirmed"], "reason": "", **outcome})
+                return JSONResponse({"reason": "", **await _pressed(console, console.desk, body)})
             accepted, reason = await console.desk.request(vehicle, action, arguments, author)
         except (ValueError, ArgumentError) as error:
             return _refused(400, str(error))
@@ -218,7 +216,9 @@ def _add_api(app: FastAPI, console: Console) -> None:
             arguments = body.get("arguments") or {}
             if not isinstance(arguments, dict):
                 raise ValueError("'arguments' is no JSON object")
-            shown = await console.preview(str(body.get("vehicle", "")), str(body.get("action", "")), arguments)
+            shown = await console.preview(
+                str(body.get("vehicle", "")), str(body.get("action", "")), arguments
+            )
         except (ValueError, ArgumentError) as error:
             return _refused(400, str(error))
         return JSONResponse(plain(shown))
@@ -311,8 +311,8 @@ def _obey(console: Console, screen: Screen, text: str) -> None:
         what = asked["type"]
         if what == "stop":
             if console.desk is not None:
-                vehicle = str(asked.get("vehicle") or "")
-                console.desk.press(vehicle if vehicle in console.source.vehicles else "", "console")
+                pressed = _pressed(console, console.desk, asked)
+                pressed.add_done_callback(lambda task: screen.client.append(_outcome(task)))
         elif what == "charts":
             console.hall.show_charts(screen, tuple(str(name) for name in asked["fields"]))
         elif what == "camera":
@@ -328,6 +328,19 @@ def _obey(console: Console, screen: Screen, text: str) -> None:
         screen.client.append(json_frame({"type": "trouble", "text": str(error)}))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         screen.client.append(json_frame({"type": "trouble", "text": f"not understood: {error}"}))
+
+
+def _pressed(console: Console, desk: Desk, asked: Mapping[str, object]) -> "asyncio.Task[dict[str, object]]":
+    """Press the stop of a vehicle, or of all where none of this run is named."""
+    vehicle = str(asked.get("vehicle") or "")
+    return desk.press(vehicle if vehicle in console.source.vehicles else "", str(asked.get("tap") or ""))
+
+
+def _outcome(pressed: "asyncio.Task[dict[str, object]]") -> bytes:
+    """What a screen is sent when its press has been answered, or has not."""
+    if pressed.cancelled() or pressed.exception() is not None:
+        return json_frame({"type": "stop", "accepted": False, "not_confirmed": []})
+    return json_frame({"type": "stop", **pressed.result()})
 
 
 def _token(request: Request, body: dict[str, object]) -> str:

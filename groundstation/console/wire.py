@@ -43,7 +43,9 @@ def picture_frame(head: Mapping[str, Any], jpeg: bytes) -> bytes:
 
 def chart_frame(samples: Mapping[str, Samples], *, is_whole: bool = False) -> bytes:
     """Samples of fields; all that there are of them, or those since the last."""
-    fields = [{"name": name, "count": len(times_s), "whole": is_whole} for name, (times_s, _) in samples.items()]
+    fields = [
+        {"name": name, "count": len(times_s), "whole": is_whole} for name, (times_s, _) in samples.items()
+    ]
     numbers = [np.ascontiguousarray(part, "<f8").tobytes() for pair in samples.values() for part in pair]
     return _headed(CHART, {"fields": fields}) + b"".join(numbers)
 

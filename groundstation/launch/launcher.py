@@ -314,7 +314,9 @@ class Launcher:
         if commands is not None:
             commands.ask_to_end()
             commands.wait(begin_s + STOP_COMMANDS_S)
-        nodes = [child for child in self._children.values() if child.name not in (RECORDER, *self._attendants)]
+        nodes = [
+            child for child in self._children.values() if child.name not in (RECORDER, *self._attendants)
+        ]
         last = [child for child in self.children if child not in nodes]
         for group, within_s in ((nodes, STOP_NODES_S), (last, STOP_ALL_S)):
             for child in group:

@@ -1,6 +1,6 @@
 // Strips of numbers over time. A field of any topic, or the residuals of a vehicle's fixes.
 
-import {age, deg, el, set, shade} from "./words.js";
+import {age, clock, deg, el, set, shade} from "./words.js";
 
 const MOST_SAMPLES = 60000, FAST_MS = 100, RESIDUAL = /^(.+): residual (x|y|heading)$/;
 const AXES = {x: [0, 1000, "mm"], y: [1, 1000, "mm"], heading: [2, 180 / Math.PI, "deg"]};
@@ -97,7 +97,8 @@ export class Charts {
 
   range() {
     if (this.window) return this.window;
-    return [this.now - Number(document.getElementById("span").value), this.now];
+    const span = Number(document.getElementById("span").value);
+    return this.isLive ? [this.now - span, this.now] : [this.now - span / 2, this.now + span / 2];
   }
 
   zoom(from, to) { this.window = [from, to]; this.isPaused = true; this.pauseShown(); this.draw(); }
@@ -187,11 +188,11 @@ class Strip {
 
   make(data) {
     const ink = shade("--faint"), axis = {stroke: ink, grid: {stroke: shade("--grid"), width: 1}, ticks: {stroke: shade("--grid")}, font: "11px system-ui"};
-    const origin = () => this.charts.now;
+    const since = (t) => this.charts.isLive ? `${(t - this.charts.now).toFixed(0)} s` : clock(t - this.charts.rig.replay.start_s);
     this.plot = new uPlot({
       width: this.width(), height: 150, legend: {show: false}, cursor: {drag: {x: true, y: false}, y: false},
       scales: {x: {time: false, auto: false}, y: {range: (u, low, high) => this.yRange(low, high)}},
-      axes: [{...axis, values: (u, splits) => splits.map((t) => this.charts.isLive ? `${(t - origin()).toFixed(0)} s` : t.toFixed(1)), size: 28}, {...axis, size: 62}],
+      axes: [{...axis, values: (u, splits) => splits.map(since), size: 28}, {...axis, size: 62}],
       series: [{}, {stroke: shade("--a"), width: 1.5, points: {show: false}, paths: this.residual ? () => null : undefined}],
       hooks: {draw: [(u) => this.marks(u)], setSelect: [(u) => this.select(u)], setCursor: [(u) => this.hover(u)]},
     }, data, this.room);
@@ -206,6 +207,7 @@ class Strip {
   marks(u) {
     const g = u.ctx, [from, to] = this.shown ?? [0, 0], top = u.bbox.top, bottom = top + u.bbox.height;
     g.save();
+    if (!this.charts.isLive) { const x = Math.round(u.valToPos(this.charts.now, "x", true)); g.fillStyle = shade("--faint"); g.fillRect(x, top, 1, bottom - top); }
     g.beginPath(); g.rect(u.bbox.left, top, u.bbox.width, u.bbox.height); g.clip();
     for (const event of this.charts.events) {
       if (event.t_s < from || event.t_s > to) continue;

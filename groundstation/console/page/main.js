@@ -33,6 +33,7 @@ const hear = {
     else if (message.type === "events") message.events.forEach(event);
     else if (message.type === "health") health.take(message);
     else if (message.type === "wizard") wizards.take(message);
+    else if (message.type === "stop") stop.answer(message);
     else if (message.type === "trouble") notice(message.text);
   },
   picture: (head, blob) => camera.take(head, blob),
@@ -65,7 +66,7 @@ function page(message) {
   document.title = `${rig.name} – ground station`;
   set(document.getElementById("rig"), rig.name);
   document.getElementById("events").replaceChildren();
-  document.querySelector(".stop").hidden = false;
+  stop.page(isLive);
   for (const part of [table, charts]) part.page(rig, isLive);
   operation.page(rig, message.may_command);
   for (const part of [camera, health, replay]) part.page(rig);

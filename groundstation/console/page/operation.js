@@ -3,8 +3,8 @@
 import {post} from "./link.js";
 import {age, clock, colour, deg, el, number, rad, set} from "./words.js";
 
-const MAIN = [["fly", "Fly"], ["land", "Land"], ["brake", "Brake"], ["resume", "Resume"],
-  ["arm", "Arm"], ["disarm", "Disarm"], ["float_on", "Float on"], ["float_off", "Float off"], ["release", "Release"]];
+const MAIN = [["fly", "Fly"], ["brake", "Brake"], ["resume", "Resume"], ["land", "Land"], ["release", "Release"],
+  ["arm", "Arm"], ["disarm", "Disarm"], ["float_on", "Float on"], ["float_off", "Float off"]];
 const FREE = new Set(["stop", "land", "disarm", "float_off", "brake"]);
 const LEASE_S = 600, RENEW_S = 240;
 
@@ -40,7 +40,7 @@ export class Operation {
     const words = el("p", {class: "words", role: "status"}, "nothing received yet");
     const facts = el("dl");
     const buttons = MAIN.map(([action, label]) => el("button", {"data-action": action, title: this.rig.actions[action]?.summary, onclick: () => this.ask(name, action)}, label));
-    const inputs = ["x / m", "y / m", "heading / deg"].map((label, i) => el("label", {}, label, el("input", {type: "number", step: i === 2 ? 5 : 0.05, "aria-label": `${name}: goal ${label}`})));
+    const inputs = ["x / m", "y / m", "heading / deg"].map((label, i) => el("label", {}, label, el("input", {type: "number", step: "any", "aria-label": `${name}: goal ${label}`})));
     const goal = el("form", {class: "goal", onsubmit: (event) => { event.preventDefault(); this.planTyped(name); }}, ...inputs, el("button", {}, "Go to"));
     const more = el("details", {}, el("summary", {}, "Controller"), this.controller(name));
     const card = el("section", {class: "vehicle", role: "region", "aria-label": name, onclick: () => this.choose(name)},
@@ -73,7 +73,7 @@ export class Operation {
     this.faults(state);
     this.scenario(state.scenario);
     const recorder = state.recorder;
-    set(document.getElementById("recorder"), recorder ? `recording ${(recorder.written_bytes / 1e6).toFixed(1)} MB${recorder.room_s < 3600 ? `, room for ${clock(recorder.room_s)}` : ""}` : "");
+    set(document.getElementById("recorder"), recorder && this.rig.kind === "live" ? `recording ${(recorder.written_bytes / 1e6).toFixed(1)} MB${recorder.room_s < 3600 ? `, room for ${clock(recorder.room_s)}` : ""}` : "");
   }
 
   vehicle(name, v) {

@@ -1,5 +1,6 @@
 // The stop: it stands alone, and needs neither the charts nor the rest of the page to work.
 
+const SECOND_WAY_MS = 4000;                                // a vehicle has three seconds to confirm
 const HINTS = ["brakes, holds, lands all", "press again: cuts the air of all, now"];
 
 export class Stop {
@@ -21,18 +22,33 @@ export class Stop {
     this.pressed = 0;
   }
 
+  page(isLive) { this.isLive = isLive; }
+
   latched(isLatched) {
-    this.hint.textContent = HINTS[isLatched ? 1 : 0];
-    this.button.classList.toggle("again", isLatched);
+    this.hint.textContent = this.isLive ? HINTS[isLatched ? 1 : 0] : "a recording: nothing flies";
+    this.button.classList.toggle("again", Boolean(isLatched) && this.isLive);
   }
 
-  async press() {
+  press() {
     this.pressed = performance.now();
-    const sent = this.link.send({type: "stop"});          // the open socket is quickest
-    if (sent) { this.notice("STOP pressed", true); return; }
+    if (this.isLive === false) { this.notice("a recording: there is nothing to stop", true); return; }
+    const tap = `${Date.now()}-${Math.random()}`;          // one press, whichever way it arrives
+    this.notice("STOP pressed …", true);
+    clearTimeout(this.second);
+    if (this.link.send({type: "stop", tap})) this.second = setTimeout(() => this.post(tap), SECOND_WAY_MS);
+    else this.post(tap);
+  }
+
+  async post(tap) {
     try {
-      const answer = await (await fetch("/api/stop", {method: "POST", keepalive: true})).json();
-      this.notice(answer.accepted ? "STOP pressed" : `STOP NOT CONFIRMED by ${(answer.not_confirmed ?? []).join(", ")}: cut the air by hand`, answer.accepted);
+      this.answer(await (await fetch("/api/stop", {method: "POST", keepalive: true, headers: {"Content-Type": "application/json"}, body: JSON.stringify({tap})})).json());
     } catch { this.notice("STOP NOT SENT: the console does not answer. Cut the air by hand."); }
+  }
+
+  answer(outcome) {
+    clearTimeout(this.second);
+    const modes = Object.entries(outcome.stopped ?? {}).map(([name, mode]) => `${name} is ${mode}`).join(", ");
+    if (outcome.accepted) this.notice(`STOP: ${modes}`, true);
+    else this.notice(`STOP NOT CONFIRMED by ${(outcome.not_confirmed ?? []).join(", ") || "anybody"}: go and cut the air by hand`);
   }
 }

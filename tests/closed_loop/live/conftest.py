@@ -67,7 +67,7 @@ camera = { source = "fixes", rate_hz = 10.0, delay_s = 0.05 }
 class Run:
     """One run: what it says, its processes, its end."""
 
-    def __init__(self, rig, folder, *words):
+    def __init__(self, rig, folder, *words, has_console=False):
         self.recording = folder / "run.mcap"
         self.folder = folder
         self._env = os.environ | {
@@ -76,6 +76,8 @@ class Run:
             "OPENBLAS_NUM_THREADS": "1",
         }
         command = [sys.executable, "-m", "groundstation", "run", str(rig), "--headless"]
+        if not has_console:  # most tests are not about it, and it costs a second of a core
+            command.append("--no-console")
         self.process = subprocess.Popen(
             [*command, "--record", str(self.recording), *words],
             stdout=subprocess.PIPE,
@@ -213,8 +215,8 @@ def launch(tmp_path):
     """Starts runs; whatever is left of them is killed at the end of the test."""
     runs = []
 
-    def start(rig, *words):
-        runs.append(Run(rig, tmp_path, *words))
+    def start(rig, *words, has_console=False):
+        runs.append(Run(rig, tmp_path, *words, has_console=has_console))
         return runs[-1]
 
     yield start
