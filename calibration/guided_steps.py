@@ -19,6 +19,7 @@ from groundstation.declarations.guide import Advice, Step, Wish
 from groundstation.declarations.message import Message
 from groundstation.frames import wrap_angle
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.supervision.modes import Mode
 
 Manoeuvre = Callable[[int, Pose], Pose]
 """The goal of a number, from where the vehicle hovered when the step began."""
@@ -37,7 +38,6 @@ class GuidedSteps:
         steps: The table.
         manoeuvres: Of the steps that are flown, by their names.
         every_s: From one goal to the next.
-        is_by_hand: A person moves it in the steps that are no rest: only the float air is asked for.
     """
 
     kinds: ClassVar = VehicleWatch.kinds
@@ -49,10 +49,7 @@ class GuidedSteps:
         steps: tuple[Step, ...],
         manoeuvres: Mapping[str, Manoeuvre],
         every_s: float = GO_TO_EVERY_S,
-        *,
-        is_by_hand: bool = False,
     ) -> None:
-        self._is_by_hand = is_by_hand
         self._keep_in, self._manoeuvres, self._every_s = keep_in, manoeuvres, every_s
         self._sequence = GuidedSequence(steps)
         self._watch = VehicleWatch(vehicle)
@@ -62,6 +59,7 @@ class GuidedSteps:
         self._looked_ns, self._pose = 0, (0.0, 0.0, 0.0)
         self._refusal = ""
         self._is_asked = self._is_given = self._is_rest = False
+        self._opened_by = ""
         self._sent, self._next_s = 0, math.inf
         self._home: Pose = (0.0, 0.0, 0.0)
 
@@ -113,7 +111,8 @@ class GuidedSteps:
             advice = self._sequence.update(now_s, known)
         if advice.is_new:
             self._begin_step(now_s, is_rest=advice.step is not None and advice.step.is_rest)
-        is_flown = advice.step is not None and not advice.step.is_rest and not self._is_by_hand
+        step = advice.step
+        is_flown = step is not None and not step.is_rest and not step.is_by_hand
         waits = self._watch.waits() if is_flown else ""
         self._advice = replace(advice, note=waits)
         return self._advice
@@ -124,7 +123,8 @@ class GuidedSteps:
 
     def trouble(self) -> str:
         """Why it ends early: somebody else has taken the vehicle; empty if nobody has."""
-        if self._is_by_hand or not self._is_given:
+        step = None if self._advice is None else self._advice.step
+        if not self._is_given or (step is not None and step.is_by_hand):
             return self._watch.stopped()
         return self._watch.taken(is_rest=self._is_rest)
 
@@ -132,7 +132,7 @@ class GuidedSteps:
         """Note what became of a request; a refusal, with its reason, ends the step."""
         if reason:
             self._refusal = f"{action} was refused: {reason}"
-        elif action in ("land", "fly", "float_on"):
+        elif action in ("land", "fly", "float_on", "resume"):
             self._is_given = True
 
     def requests(self, now_s: float) -> Iterator[Wish]:
@@ -141,11 +141,9 @@ class GuidedSteps:
         if step is None or self._refusal:
             return
         if not self._is_asked:
-            self._is_asked = step.is_rest or not self._watch.is_on_its_way_down
-            if self._is_asked:
-                yield "land" if step.is_rest else "float_on" if self._is_by_hand else "fly", {}
+            yield from self._opening(step)
             return
-        if self._is_by_hand or step.is_rest or not self._is_given or self._watch.waits():
+        if step.is_by_hand or step.is_rest or not self._is_given or self._watch.waits():
             return
         if self._next_s == math.inf:
             self._home, self._next_s = self._pose, now_s + SETTLE_S
@@ -156,10 +154,29 @@ class GuidedSteps:
         self._sent += 1
         yield "go_to", {"x_m": x_m, "y_m": y_m, "heading_rad": math.remainder(heading_rad, math.tau)}
 
+    def _opening(self, step: Step) -> Iterator[Wish]:
+        """What a step has to begin with, as the vehicle is by now."""
+        watch, wanted = self._watch, "fly"
+        if step.is_rest:
+            wanted = "land"
+        elif watch.mode == (Mode.FLOATING if step.is_by_hand else Mode.FLYING):
+            self._is_asked = self._is_given = True
+            return
+        elif step.is_by_hand:  # a controller that flies would work against the hand
+            wanted = "land" if watch.wants_flight else "float_on"
+        elif watch.mode in (Mode.BRAKING, Mode.HOLDING):
+            wanted = "resume"
+        if wanted == self._opened_by or (wanted in ("fly", "float_on") and watch.is_on_its_way_down):
+            return
+        self._opened_by = wanted
+        self._is_asked = step.is_rest or wanted != "land"
+        yield wanted, {}
+
     def _begin_step(self, now_s: float, *, is_rest: bool) -> None:
         """Forget the step before, but not that it has been given what this one needs as well."""
         self._is_given = self._is_given and self._is_rest == is_rest
         self._is_asked, self._is_rest, self._refusal = self._is_given, is_rest, ""
+        self._opened_by = ""
         self._began_s, self._next_s, self._sent = now_s, math.inf, 0
 
     def _amounts(self, now_s: float) -> dict[str, float]:

@@ -68,13 +68,18 @@ STEPS: tuple[Step, ...] = (
     ),
 )
 AXES = (("x", 1e3, "mm"), ("y", 1e3, "mm"), ("heading", math.degrees(1.0), "deg"))
+SWING_RAD = 0.75
 WORST_NIS = 9.0
 """Three times what chance gives: the constants, or their sigmas, do not hold for the flight set aside."""
 
 
 def check(number: int, home: Pose) -> Pose:
-    """The goal of a number: to and fro, begun elsewhere than the flight that was fitted."""
-    return push(number + 2, home)
+    """The goal of a number: to and fro over other places, turning one way and back.
+
+    A scale that is off looks like a bias as long as it turns one way.
+    """
+    x_m, y_m, _ = push(number + 2, home)
+    return x_m, y_m, home[2] + (SWING_RAD if number % 2 == 0 else -SWING_RAD)
 
 
 MANOEUVRES = {"turn": turn, "push": push, CHECK: check}

@@ -9,6 +9,7 @@ from calibration.sky.guided_pictures import CHECK, GuidedPictures, Plan, missing
 from calibration.sky.lens import lens_from_stars
 from groundstation.declarations.guide import Goal, Step
 from groundstation.declarations.rig import Rig
+from groundstation.star_tracking.camera_model import CameraCalibration
 
 STEPS: tuple[Step, ...] = (
     Step(
@@ -50,7 +51,7 @@ class GuidedLens(GuidedPictures):
             CalibrationRefusedError: Too few pictures could be solved, or they do not determine the lens.
         """
         found = lens_from_stars(self.fitted, self.catalogue, self.camera)
-        assert found.camera is not None
+        assert isinstance(found.camera, CameraCalibration)
         after = self.judged(found.camera, self.catalogue)
         before = self.judged(self.camera, self.catalogue)
         warnings = (*found.warnings, *complaints(before, after))

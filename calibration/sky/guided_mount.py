@@ -1,7 +1,7 @@
 """The mount of a star camera by turning in place, step by step.
 
-A mock-up that turns about a pin, or on its air about its centre, keeps its origin where it is; a mount that is
-not where the rig has it makes the origin go round in a circle. It has to be turned by hand: a vehicle that
+A mock-up that turns about a pin, or on its air about its centre, keeps its origin where it is; a mount that
+is not where the rig has it makes the origin go round in a circle. It has to be turned by hand: a vehicle that
 flies by this very camera holds the place that the wrong mount shows, and would see no circle.
 """
 
@@ -17,20 +17,24 @@ from calibration.sky.guided_pictures import CHECK, GuidedPictures, Judged, Plan,
 from calibration.sky.lens import mount_from_turn
 from groundstation.declarations.guide import Curve, Drawing, Goal, Mark, Step
 from groundstation.declarations.rig import Rig
+from groundstation.star_tracking.camera_model import CameraCalibration
 
 WOBBLE_M = 1e-3
 """A pin, or the air, lets the centre move so far."""
+MOST_WANDER_M = 3e-3
+"""Beyond, it was not turned in place, and the offset is none."""
 STEPS: tuple[Step, ...] = (
     Step(
         "turn",
-        "With the float air on, turn the mock-up by hand slowly about its centre (on a pin, or at rest on its "
-        "air), more than once around.",
+        "With the float air on, turn the mock-up by hand slowly about its centre (on a pin, or at rest on "
+        "its air), more than once around.",
         False,
         (
             Goal("pictures", 40.0, "pictures", is_amount=True),
             Goal("turned_rad", 6.5, "rad", is_amount=True),
         ),
         300.0,
+        is_by_hand=True,
     ),
     Step(
         CHECK,
@@ -41,9 +45,10 @@ STEPS: tuple[Step, ...] = (
             Goal("turned_rad", 3.3, "rad", is_amount=True),
         ),
         200.0,
+        is_by_hand=True,
     ),
 )
-PLAN = Plan(STEPS, {}, is_by_hand=True)
+PLAN = Plan(STEPS, {})
 
 
 class GuidedMount(GuidedPictures):
@@ -64,10 +69,16 @@ class GuidedMount(GuidedPictures):
             CalibrationRefusedError: Too few pictures could be solved, or the turn is too small.
         """
         found = mount_from_turn(self.fitted, self.catalogue, self.camera, wobble_m=WOBBLE_M)
-        assert found.camera is not None
+        assert isinstance(found.camera, CameraCalibration)
         after = self.judged(found.camera, self.catalogue)
         before = self.judged(self.camera, self.catalogue)
         warnings = (*found.warnings, *complaints(before, after))
+        if after.wander_m > MOST_WANDER_M:
+            warnings = (
+                *warnings,
+                f"the origin moved by {1e3 * after.wander_m:.1f} mm while it was turned: that was not in "
+                "place, and the offset is not to be believed",
+            )
         if after.wander_m > 1.2 * before.wander_m:
             warnings = (*warnings, "the origin wanders farther than with the rig's own mount")
         return Outcome(

@@ -44,13 +44,11 @@ class Plan:
         steps: The table; the last step is the one set aside.
         manoeuvres: Of the steps that are flown.
         every_s: From one goal to the next.
-        is_by_hand: A person moves the mock-up.
     """
 
     steps: tuple[Step, ...]
     manoeuvres: Mapping[str, Manoeuvre]
     every_s: float = 7.0
-    is_by_hand: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +99,6 @@ class GuidedPictures:
             plan.steps,
             plan.manoeuvres,
             plan.every_s,
-            is_by_hand=plan.is_by_hand,
         )
         self.fitted: list[Spots] = []
         self.checked: list[Spots] = []

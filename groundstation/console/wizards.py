@@ -25,7 +25,7 @@ from groundstation.parts.operation.messages import RecorderStatus
 
 STEP_S = 0.2
 FOLDER = Path("calibrations")
-"""Beside the recordings, where the run was started."""
+"""Beside the recording; where the run was started if nothing is recorded."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -40,7 +40,6 @@ class Wizards:
         desk: Where requests are made.
         holder: Who holds control now; empty for nobody.
         tell: Sends a frame to all screens.
-        folder: Results are written to.
     """
 
     def __init__(
@@ -52,11 +51,10 @@ class Wizards:
         desk: Desk,
         holder: Callable[[], str],
         tell: Callable[[str, bytes], None],
-        folder: Path = FOLDER,
     ) -> None:
         self._rig, self._rig_name, self._feed, self._desk = rig, rig_name, feed, desk
         self._rig_sha256 = hashlib.sha256(rig_text.encode()).hexdigest()
-        self._holder, self._tell, self._folder = holder, tell, folder
+        self._holder, self._tell = holder, tell
         self._wizards: dict[str, Wizard] = {}
         self._broken: dict[str, str] = {}
         self._session: Session | None = None
@@ -84,17 +82,17 @@ class Wizards:
         self._show()
         while True:
             await asyncio.sleep(STEP_S)
-            session, tap = self._session, self._tap
-            if session is None or tap is None:
+            session = self._session
+            if session is None or session.state not in (State.COLLECTING, State.FITTING):
                 continue
             try:
-                await self._go_on(session, tap)
+                await self._go_on(session)
             except Exception as error:  # whatever somebody's guide raises
                 _LOG.exception("the guided calibration %s failed", session.name)
                 session.end(f"the guide failed: {error}.")
-            if session.state is not State.COLLECTING and self._tap is tap:
-                self._untap()
             if session is self._session:
+                if session.state is not State.COLLECTING:
+                    self._untap()
                 self._show()
 
     def start(self, name: str, vehicle: str, author: str, *, is_driven: bool) -> None:
@@ -161,17 +159,16 @@ class Wizards:
             self._mark(f"{author} discards the calibration {session.name} of {session.vehicle}")
         self._show()
 
-    async def _go_on(self, session: Session, tap: WizardTap) -> None:
+    async def _go_on(self, session: Session) -> None:
         if session.state is State.FITTING:
             await asyncio.to_thread(session.fit)
             return
-        if session.state is not State.COLLECTING:
-            return
+        assert self._tap is not None
         holder = self._holder()
         if session.is_driven and holder != session.author:
             session.end(f"control is held by {holder or 'nobody'}: who drives a calibration has to hold it.")
             return
-        messages, until_ns = tap.ready()
+        messages, until_ns = self._tap.ready()
         answers, self._answers = self._answers, []
         for request in await asyncio.to_thread(session.go_on, messages, answers, until_ns):
             task = asyncio.create_task(self._ask(session, request))
@@ -202,13 +199,14 @@ class Wizards:
 
     def _write(self, session: Session) -> tuple[str, ...]:
         assert session.found is not None
-        check_folder(self._folder)
-        self._folder.mkdir(parents=True, exist_ok=True)
+        recorder = self._feed.get(RecorderStatus, "")
+        folder = Path(recorder.path).parent / FOLDER if recorder is not None and recorder.path else FOLDER
+        check_folder(folder)
+        folder.mkdir(parents=True, exist_ok=True)
         now = datetime.now(UTC)
         stem = f"{session.vehicle}_{session.name}_{now:%Y%m%d_%H%M%S}"
-        recorder = self._feed.get(RecorderStatus, "")
         source = f"live, rig {self._rig_name}" + (f", {Path(recorder.path).name}" if recorder else "")
-        contents = session.found.written(self._folder / f"{stem}.toml", source, self._rig_sha256, now)
+        contents = session.found.written(folder / f"{stem}.toml", source, self._rig_sha256, now)
         there = [str(path) for path in contents if path.exists()]
         if there:
             raise FileError(f"{there[0]} is there already: nothing is overwritten.")

@@ -49,6 +49,8 @@ class Step:
     goals: tuple[Goal, ...]
     longest_s: float
     """After this long it is given up, with what is known by then."""
+    is_by_hand: bool = False
+    """A person moves the vehicle, driven or not: of it only the float air is asked for."""
 
 
 @dataclass(frozen=True, slots=True)

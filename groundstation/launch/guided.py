@@ -94,7 +94,9 @@ class GuideNode(Node):
         if self.is_done or not self._has_begun:
             return
         advice = self._guide.advice(now_ns * 1e-9)
-        if self._author and advice.is_new and advice.step is not None and not advice.step.is_rest:
+        step = advice.step
+        is_flown = step is not None and not step.is_rest and not step.is_by_hand
+        if self._author and advice.is_new and is_flown:
             advice = replace(advice, note="; ".join(filter(None, (BY_ITSELF, advice.note))))
         self._advise(advice)
         if advice.step is None:
