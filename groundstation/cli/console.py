@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.console_option import FIRST_PORT, HOST, console_access, print_address
+from groundstation.cli.console_option import FIRST_PORT, HOST, console_access
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.errors import RecordingError
 
@@ -31,7 +31,8 @@ def console(
     from groundstation.console.replay import serve  # what only the server needs
 
     access = console_access(HOST, port, None)
-    print_address(access)
+    for line in access.greeting:
+        print(line, flush=True)
     try:
         serve(recording, beside, access)
     except RecordingError as error:

@@ -55,25 +55,14 @@ def console_access(host: str, port: int, certificates: Path | None) -> Access:
 
 
 def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:
-    """The console beside a run, its address printed; nothing where none is wanted.
+    """The console beside a run; nothing where none is wanted.
 
     Raises:
         UsageError: It cannot be opened so.
     """
     if no_console:
         return []
-    access = console_access(host, port, certificates)
-    print_address(access)
-    return [attendant(access)]
-
-
-def print_address(access: Access) -> None:
-    """Print what people open."""
-    if not access.operator:
-        print(f"console: {access.address}", flush=True)
-        return
-    print(f"console: {access.address}?token={access.operator}", flush=True)
-    print(f"console, for those who look on: {access.address}?token={access.observer}", flush=True)
+    return [attendant(console_access(host, port, certificates))]
 
 
 def _free(host: str, first: int) -> int:

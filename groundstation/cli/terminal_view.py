@@ -58,6 +58,7 @@ class TerminalView:
         self._console = console
         self._live: Live | None = None
         self._waited_for = ""
+        self._greeted = 0
         self._lower_shows: object = None
         self._lower_lines = 0
         self._rendered = Segments([])
@@ -97,6 +98,10 @@ class TerminalView:
             self._run.monitor.note(waited_for)
         for line in self._run.monitor.take_lines():
             print(f"{self._elapsed_s():7.1f} s  {line}", flush=True)
+        greetings = self._run.launcher.greetings
+        for line in greetings[self._greeted :]:
+            print(line, flush=True)
+        self._greeted = len(greetings)
 
     def print_vehicles(self) -> None:
         """One line per vehicle of which anything was received."""
@@ -133,7 +138,8 @@ class TerminalView:
         shown = room - self._lower_lines if has_lower else room
         lines = list(run.monitor.lines)[-max(min(shown, _MOST_EVENTS), 1) :]
         events = Text("\n".join(lines) or "starting ...", no_wrap=True, overflow="ellipsis")
-        keys = Text(self._keys or "Ctrl-C ends", style="bold" if self._keys else _DIM, no_wrap=True,
+        offered = "   ".join([self._keys or "Ctrl-C ends", *run.launcher.greetings])
+        keys = Text(offered, style="bold" if self._keys else _DIM, no_wrap=True,
                     overflow="ellipsis")  # fmt: skip
         return Group(
             title,

@@ -62,6 +62,16 @@ class Access:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}/"
 
+    @property
+    def greeting(self) -> tuple[str, ...]:
+        """What is printed for people: an address to open, one for each role where there are two."""
+        if not self.operator:
+            return (f"console: {self.address}",)
+        return (
+            f"console: {self.address}?token={self.operator}",
+            f"console, for those who look on: {self.address}?token={self.observer}",
+        )
+
     def trouble(self) -> str:
         """Why it must not be opened so; empty if it may."""
         if self.is_loopback:

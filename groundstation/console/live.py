@@ -26,7 +26,7 @@ from groundstation.launch.process import NICENESS, stop_when_asked
 from groundstation.rig.read import parse_rig
 
 MOST_BATCHES = 4096
-ALIVE_S = 0.5
+ALIVE_S, LOOK_S = 0.5, 0.02
 PICTURE_S = 1.0
 LISTEN_BACKLOG = 64
 
@@ -123,10 +123,9 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
     stop_when_asked(stop)
     server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]  # the launcher asks
     tasks = [
-        asyncio.create_task(_report_life(bus, orders.process)),
+        asyncio.create_task(_report_life(bus, orders.process, server)),
         asyncio.create_task(_keep_pictures(console, desk)),
     ]
-    bus.announce(orders.process)
     try:
         await server.serve()
     except SystemExit as error:
@@ -136,8 +135,11 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
             task.cancel()
 
 
-async def _report_life(bus: ZenohBus, process: str) -> None:
-    """An empty batch is its sign of life."""
+async def _report_life(bus: ZenohBus, process: str, server: uvicorn.Server) -> None:
+    """Announce that it listens; from then on an empty batch is its sign of life."""
+    while not server.started:
+        await asyncio.sleep(LOOK_S)
+    bus.announce(process)
     while True:
         bus.publish_batch(process, RecordWriter().take())
         await asyncio.sleep(ALIVE_S)

@@ -23,4 +23,4 @@ class Options:
 
 def attendant(access: Access) -> Attendant:
     """The console as a process beside a rig's."""
-    return Attendant(CONSOLE, "groundstation.console.live:run", Options(access))
+    return Attendant(CONSOLE, "groundstation.console.live:run", Options(access), access.greeting)

@@ -19,11 +19,13 @@ class Attendant:
         target: ``module:function``, called with its orders; imported in the process itself, so that neither
             the launcher nor the processes of the rig load what only it needs.
         options: What it is told; pickled.
+        greeting: What people are told once it is ready.
     """
 
     name: str
     target: str
     options: object = field(default=None, repr=False)
+    greeting: tuple[str, ...] = ()
 
 
 def run(orders: Orders) -> None:

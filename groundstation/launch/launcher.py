@@ -132,6 +132,16 @@ class Launcher:
         ]
 
     @property
+    def greetings(self) -> list[str]:
+        """What people are told of attendants that are ready, or were."""
+        ready = (
+            name
+            for name in self._attendants
+            if name in self._children and self._children[name].has_been_ready
+        )
+        return [line for name in ready for line in self._attendants[name].greeting]
+
+    @property
     def recording_trouble(self) -> str:
         """Why the recording could not be written to its end; known after ``close``, empty where it could."""
         child = self._children.get(RECORDER)
