@@ -57,6 +57,8 @@ STEPS: tuple[Step, ...] = (
     ),
 )
 EVERY_S = 7.0
+MOST_ASIDE = 0.02
+"""Share of a flight that something else may have pushed in."""
 AXES = (
     ("velocity_x", 1e3, "mm/s", "m/s"),
     ("velocity_y", 1e3, "mm/s", "m/s"),
@@ -85,6 +87,7 @@ class GuidedValves:
         self._config = identification_config(rig, vehicle)
         self._check = ValveCheck(type_.model(), self._config)
         self._learned: ValvesLearned | None = None
+        self._flown_s = 0.0
         self._force = [LiveCurve(f"force {axis}, mm/s²", "line", 0.05) for axis in "xy"]
 
     @property
@@ -103,6 +106,8 @@ class GuidedValves:
         if self._steps.name == CHECK:
             self._check.take(message)
         elif isinstance(message, self._learner.inputs):
+            if isinstance(message, Imu) and self._steps.floats:
+                self._flown_s += message.window_s
             list(self._learner.receive(message, now_ns))
 
     def advice(self, now_s: float) -> Advice:
@@ -160,6 +165,12 @@ class GuidedValves:
         quantities = _quantities(learned, self._thrust_n)
         unknown = [k for k, ratio in enumerate(learned.thrust_over_mass_ratio) if not math.isfinite(ratio)]
         warnings = tuple(f"valve {k} has not pushed long enough to be known" for k in unknown)
+        aside = learned.set_aside * self._config.block_s / max(self._flown_s, self._config.block_s)
+        if aside > MOST_ASIDE:
+            warnings += (
+                f"{100.0 * aside:.0f} % of the flight fits no push of valves: something else pushed, or the "
+                "stamps of IMU and commands do not agree (is the machine overloaded?)",
+            )
         verification, complaint, drawings = self._verified(learned)
         return Outcome(
             title=f"Valves of {self._vehicle}, guided",

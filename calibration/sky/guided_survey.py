@@ -29,7 +29,7 @@ from groundstation.star_tracking.tracker import StarTracker
 
 LANE_M, STRIDE_M, MARGIN_M = 0.6, 0.5, 0.35
 """Lanes of the sweep, places along them, and what is left to the edges."""
-ANCHORS = 4
+ANCHORS, ANCHOR_SIGHTINGS = 4, 4
 ANCHOR_SIGMA_M = 1e-3
 """How well a star of the old list is believed where the list states nothing."""
 STEPS: tuple[Step, ...] = (
@@ -136,16 +136,22 @@ def _anchors(pictures: Sequence[Spots], catalogue: StarCatalogue, tracker: StarT
     Raises:
         CalibrationRefusedError: No picture can be solved with that list.
     """
-    seen: dict[int, tuple[int, float, float]] = {}
+    sightings: dict[int, list[tuple[float, int, float, float]]] = {}
+    middle_px = np.array([tracker.camera.width, tracker.camera.height]) / 2.0
     for number, spots in enumerate(pictures):
         fix = tracker.solve(spots)
         if not isinstance(fix, PictureFix):
             continue
         for spot, star in zip(fix.spot_index.tolist(), fix.star_index.tolist(), strict=True):
-            seen.setdefault(star, (number, float(spots.u_px[spot]), float(spots.v_px[spot])))
+            u_px, v_px = float(spots.u_px[spot]), float(spots.v_px[spot])
+            away_px = math.dist((u_px, v_px), middle_px)
+            sightings.setdefault(star, []).append((away_px, number, u_px, v_px))
+    # where a star is nearest to the middle the pictures around show it, too
+    seen = {star: min(rows)[1:] for star, rows in sightings.items() if len(rows) >= ANCHOR_SIGHTINGS}
     if len(seen) < ANCHORS:
         raise CalibrationRefusedError(
-            f"{len(seen)} stars of the rig's list were recognised, {ANCHORS} are needed to hold the frame"
+            f"{len(seen)} stars of the rig's list were recognised often enough, {ANCHORS} are needed to hold "
+            "the frame"
         )
     stars = np.array(sorted(seen))
     place = np.column_stack((catalogue.x_m[stars], catalogue.y_m[stars]))

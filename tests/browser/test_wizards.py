@@ -1,93 +1,90 @@
 """A guided calibration as an operator meets it: what to do, what is seen, the result, accept or discard."""
 
-import json
 import tomllib
+from pathlib import Path
 
 import pytest
+from oracles.slow_guide import MeanWizard
+from oracles.wizard_console import ServedConsole
+
+from groundstation.console import wizards
+from groundstation.rig.read import load_rig
 
 pytestmark = pytest.mark.slow
+RIG = Path(__file__).parents[2] / "examples" / "rigs" / "two_mock_ups_drawn.toml"
 S = 1000
-FLYING_MS, COLLECTED_MS = 90 * S, 280 * S
 HEADING = "() => document.querySelector('.wizard h2')?.textContent.includes(%r)"
-
-
-def wait_for(page, words, timeout_ms):
-    page.wait_for_function(HEADING % words, timeout=timeout_ms)
+NOTICE = "() => /%s/i.test(document.getElementById('notice').textContent)"
+STEP = "() => document.querySelector('.wizard-instruction')?.textContent === %r"
 
 
 @pytest.fixture
-def page(opened, flight):
-    found = opened(flight.address, "tablet")
-    condition = "Object.values(s.vehicles).every((v) => v.mode === 'flying')"
-    found.wait_for_function(
-        f"async () => await fetch('/api/state').then((a) => a.json()).then((s) => {condition})",
-        timeout=FLYING_MS,
-        polling=200,
-    )
-    found.get_by_role("tab", name="Wizards").click()
-    return found
+def served(tmp_path, monkeypatch):
+    """A console whose only wizard takes the mean of 60 states."""
+    wizard = MeanWizard(60)
+    monkeypatch.setattr(wizards, "wizard_names", lambda: ("mean",))
+    monkeypatch.setattr(wizards, "load_wizard", lambda name: wizard)
+    console = ServedConsole(load_rig(RIG), tmp_path / "run.mcap")
+    yield console
+    console.close()
 
 
-def test_the_valves_of_a_flying_mock_up_are_identified_and_accepted(page, flight):
-    card = page.get_by_role("region", name="valves", exact=True)
-    assert "thrust" in card.inner_text()
-    absent = page.get_by_role("region", name="mount", exact=True)
-    assert "it has no star camera" in absent.inner_text()
-    card.get_by_role("button", name="Start").click()
-    page.wait_for_function("() => /take control/i.test(document.getElementById('notice').textContent)")
+def take_control(page, name="anna"):
     page.get_by_role("button", name="Take control").click()
-    page.get_by_label("Your name").fill("anna")
+    page.get_by_label("Your name").fill(name)
     page.get_by_role("button", name="Take it").click()
     page.wait_for_function("() => document.getElementById('lease').textContent.startsWith('you hold')")
+
+
+@pytest.mark.parametrize(("size", "scheme"), [("phone", "light"), ("tablet", "dark"), ("laptop", "light")])
+def test_it_is_followed_judged_and_accepted(opened, served, tmp_path, size, scheme):
+    page = opened(served.address, size, scheme)
+    page.get_by_role("tab", name="Wizards").click()
+    card = page.get_by_role("region", name="mean", exact=True)
     card.get_by_role("button", name="Start").click()
-    wait_for(page, "valves of alpha: Going on", 20 * S)
-    page.wait_for_function(
-        "() => /hands off/.test(document.querySelector('.wizard-instruction').textContent)"
-    )
-    assert (
-        page.get_by_role("region", name="imu", exact=True).get_by_role("button", name="Start").is_disabled()
-    )
-    page.wait_for_function(
-        "() => /fly to and fro/.test(document.querySelector('.wizard-instruction').textContent)",
-        timeout=COLLECTED_MS,
-    )
-    picture = page.get_by_role("img", name="Each valve over the rig's")
-    page.wait_for_function(
-        "() => [...document.querySelectorAll('.wizard canvas')].some((c) => "
-        "/thrust over mass, [1-8] points/.test(c.getAttribute('aria-label')))",
-        timeout=COLLECTED_MS,
-    )
-    assert picture.is_visible()
-    page.screenshot(path=flight.folder / "wizard_collecting.png", full_page=True)
-    wait_for(page, "Result: accept or discard", COLLECTED_MS)
+    page.wait_for_function(NOTICE % "take control")
+    take_control(page)
+    card.get_by_role("button", name="Start").click()
+    page.wait_for_function(HEADING % "mean of alpha: Going on", timeout=20 * S)
+    page.wait_for_function(STEP % "Let it stand.", timeout=20 * S)
+    assert card.get_by_role("button", name="Start").is_disabled()
+    picture = page.get_by_role("img", name="What came: x,")
+    picture.wait_for(timeout=20 * S)
+    page.wait_for_function(STEP % "Let it stand on.", timeout=20 * S)
+    page.screenshot(path=tmp_path / f"collecting_{size}.png")
+    page.wait_for_function(HEADING % "Result: accept or discard", timeout=30 * S)
     text = page.get_by_role("region", name="Guided calibration").inner_text()
-    assert "Verified by a flight of" in text
-    assert "valve 0 thrust over mass" in text
-    page.screenshot(path=flight.folder / "wizard_result.png", full_page=True)
-    assert not (flight.folder / "calibrations").exists()
+    assert "Verified by" in text
+    assert "states more" in text
+    assert "collect: enough data" in text
+    page.screenshot(path=tmp_path / f"result_{size}.png")
+    assert not (tmp_path / "calibrations").exists()
+    assert not page.evaluate("document.documentElement.scrollWidth > innerWidth + 1")
     page.get_by_role("button", name="Accept").click()
-    wait_for(page, "Accepted", 20 * S)
-    (path,) = (flight.folder / "calibrations").glob("alpha_valves_*.toml")
+    page.wait_for_function(HEADING % "Accepted", timeout=20 * S)
+    (path,) = (tmp_path / "calibrations").glob("alpha_mean_*.toml")
     assert str(path) in page.get_by_role("region", name="Guided calibration").inner_text()
-    written = tomllib.loads(path.read_text())
-    assert written["recording"].startswith("live, rig two_mock_ups_drawn.toml")
-    assert written["verification"]["rate"]["value"] < 5e-3
-    page.get_by_role("button", name="Close").click()
-    page.get_by_role("button", name="Give control").click()
-    page.wait_for_function("() => document.getElementById('lease').textContent === 'nobody holds control'")
+    assert tomllib.loads(path.read_text())["mean"]["value"] == 0.25
+    assert served.desk.asked[0] == ("alpha", "land", {}, "anna")  # driven, in the holder's name
 
 
-def test_discarded_it_leaves_nothing_and_the_vehicle_is_still_there(page, flight, api):
-    files = set(flight.folder.glob("calibrations/*"))
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_label("Your name").fill("bert")
-    page.get_by_role("button", name="Take it").click()
-    page.wait_for_function("() => document.getElementById('lease').textContent.startsWith('you hold')")
-    card = page.get_by_role("region", name="imu", exact=True)
+def test_discarded_it_leaves_nothing_and_whoever_looks_on_sees_the_same(opened, served, tmp_path):
+    page, other = opened(served.address), opened(served.address, "tablet")
+    for each in (page, other):
+        each.get_by_role("tab", name="Wizards").click()
+    take_control(page)
+    card = page.get_by_role("region", name="mean", exact=True)
     card.get_by_label("it flies by itself").uncheck()
     card.get_by_role("button", name="Start").click()
-    wait_for(page, "imu of alpha: Going on", 20 * S)
+    for each in (page, other):
+        each.wait_for_function(HEADING % "Result: accept or discard", timeout=40 * S)
+    other.get_by_role("button", name="Accept").click()  # without control
+    other.wait_for_function(NOTICE % "take control")
     page.get_by_role("button", name="Discard").click()
-    page.wait_for_function("() => document.querySelector('.wizard').hidden")
-    assert set(flight.folder.glob("calibrations/*")) == files
-    assert json.dumps(api(page)["vehicles"]["alpha"]["mode"]) in ('"flying"', '"holding"')
+    for each in (page, other):
+        each.wait_for_function("() => document.querySelector('.wizard').hidden")
+    assert not list(tmp_path.glob("calibrations/*"))
+    assert not served.desk.asked
+    late = opened(served.address, "phone")
+    late.get_by_role("tab", name="Wizards").click()
+    assert late.get_by_role("region", name="mean", exact=True).is_visible()

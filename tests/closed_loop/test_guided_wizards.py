@@ -14,6 +14,7 @@ import pytest
 from groundstation.declarations.request import Request
 from groundstation.launch import guided
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]
 LONGEST_S = 400
 QUICK = (("rate_hz = 1.5", "rate_hz = 5.0"), ("delay_s = 0.6", "delay_s = 0.1"))
 AT_REST = (("bus_index = 0", "bus_index = 0\nstarts_by_itself = false"),)
@@ -55,7 +56,6 @@ def off(found, true):
     return {name: (found[name].value - value) / found[name].sigma for name, value in true.items()}
 
 
-@pytest.mark.slow
 def test_valves(lead):
     hidden = hidden_valves()
     changes = [("start_m = [0.0, 0.0]", f"start_m = [0.0, 0.0]\n{hidden.hidden()}"), *QUICK, *AT_REST]
@@ -76,7 +76,6 @@ def test_valves(lead):
     assert [row.action for row in flight.of(Request) if row.action != "go_to"] == ["land", "fly"]
 
 
-@pytest.mark.slow
 def test_motion_capture(lead, tmp_path):
     changes = [
         ("delay_s = 0.008\ndelay_sigma_s", "delay_s = 0.006\ndelay_sigma_s"),
@@ -108,7 +107,6 @@ def test_motion_capture(lead, tmp_path):
     assert written["verification"]["x"]["value"] == pytest.approx(outcome.verification["x"].value)
 
 
-@pytest.mark.slow
 def test_mount_turned_by_hand(lead, tmp_path):
     true = json.loads((EMULATED / "camera.json").read_text())
     x_m, y_m, z_m = true["mount_offset_body_m"]
@@ -145,7 +143,6 @@ def test_mount_turned_by_hand(lead, tmp_path):
     assert not outcome.warnings
 
 
-@pytest.mark.slow
 def test_lens(lead, tmp_path):
     true = json.loads((EMULATED / "camera.json").read_text())
     true["fx"] *= 1.004

@@ -4,10 +4,12 @@ import asyncio
 import json
 import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from oracles.hand_fed_console import batch_of, state_of
 from oracles.slow_guide import MeanWizard
+from oracles.wizard_console import GrantingDesk
 
 from groundstation.console import wizard_session
 from groundstation.console import wizards as module
@@ -19,23 +21,9 @@ from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.operation.messages import RecorderStatus
 
 
-class NotingDesk:
-    """Takes requests and notes instead of a rig."""
-
-    def __init__(self):
-        self.asked, self.marks, self.answer = [], [], (True, "")
-
-    async def request(self, vehicle, action, arguments, author):
-        self.asked.append((vehicle, action, dict(arguments), author))
-        return self.answer
-
-    def mark(self, text):
-        self.marks.append(text)
-
-
 @pytest.fixture
-def desk():
-    return NotingDesk()
+def desk(feed):
+    return GrantingDesk(feed)
 
 
 @pytest.fixture
@@ -75,7 +63,9 @@ def lead(rig, feed, desk, wizard, frames, tmp_path):
             finally:
                 running.cancel()
 
-        asyncio.run(asyncio.wait_for(led(), 60.0))
+        # a thread of its own: a browser's test may have left a loop in this one
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(lambda: asyncio.run(asyncio.wait_for(led(), 60.0))).result()
 
     return begin
 
