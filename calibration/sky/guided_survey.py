@@ -22,6 +22,7 @@ from calibration.sky.survey.surveyed_sky import Anchor
 from calibration.sky.survey.sweep import Survey, survey_sweep
 from groundstation.declarations.guide import Curve, Drawing, Goal, Step
 from groundstation.declarations.rig import Rig
+from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.detection import Spots
 from groundstation.star_tracking.fixes import PictureFix
 from groundstation.star_tracking.star_catalogue import StarCatalogue
@@ -89,7 +90,7 @@ class GuidedSurvey(GuidedPictures):
         Raises:
             CalibrationRefusedError: Anchors or overlaps do not suffice.
         """
-        anchors = _anchors(self.fitted, self.catalogue, StarTracker(self.catalogue, self.camera))
+        anchors = _anchors(self.fitted, self.catalogue, self.camera)
         known_m = np.isfinite(self.catalogue.sigma_m) & (self.catalogue.sigma_m > 0.0)
         tape_m = float(np.median(self.catalogue.sigma_m[known_m])) if known_m.any() else ANCHOR_SIGMA_M
         names = [f"picture {number}" for number in range(1, len(self.fitted) + 1)]
@@ -127,17 +128,18 @@ class GuidedSurvey(GuidedPictures):
 def _places(low_m: float, high_m: float, step_m: float) -> list[float]:
     length_m = max(0.0, high_m - low_m - 2.0 * MARGIN_M)
     count = max(2, math.ceil(length_m / step_m) + 1)
-    return np.linspace(low_m + MARGIN_M, high_m - MARGIN_M, count).tolist()
+    step = (high_m - low_m - 2.0 * MARGIN_M) / (count - 1)
+    return [low_m + MARGIN_M + step * number for number in range(count)]
 
 
-def _anchors(pictures: Sequence[Spots], catalogue: StarCatalogue, tracker: StarTracker) -> list[Anchor]:
+def _anchors(pictures: Sequence[Spots], catalogue: StarCatalogue, camera: CameraCalibration) -> list[Anchor]:
     """Stars of the old list far from each other, each where a picture shows it.
 
     Raises:
         CalibrationRefusedError: No picture can be solved with that list.
     """
     sightings: dict[int, list[tuple[float, int, float, float]]] = {}
-    middle_px = np.array([tracker.camera.width, tracker.camera.height]) / 2.0
+    tracker, middle_px = StarTracker(catalogue, camera), (camera.width / 2.0, camera.height / 2.0)
     for number, spots in enumerate(pictures):
         fix = tracker.solve(spots)
         if not isinstance(fix, PictureFix):

@@ -1,4 +1,4 @@
-"""``POST /api/wizard``: start, accept or discard a guided calibration; whoever holds control may."""
+"""``/api/wizard``: what goes on; start, accept or discard a guided calibration, for whoever holds control."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -31,6 +31,12 @@ def add_wizard(
         token_of: The lease's token in a request.
         refused: An answer with a reason.
     """
+
+    @app.get("/api/wizard")
+    async def shown() -> Response:
+        if console.wizards is None:
+            return refused(409, "this is a recording: nothing can be calibrated live")
+        return JSONResponse(console.wizards.page())
 
     @app.post("/api/wizard")
     async def wizard(request: Request) -> Response:

@@ -11,7 +11,7 @@ from typing import Any
 
 from groundstation.console.desk import Desk, NotAllowedError
 from groundstation.console.feed import Feed
-from groundstation.console.wire import json_frame
+from groundstation.console.wire import json_frame, plain
 from groundstation.console.wizard_session import Session, State
 from groundstation.console.wizard_tap import WizardTap
 from groundstation.declarations.errors import UsageError
@@ -63,8 +63,8 @@ class Wizards:
         self._asking: set[asyncio.Task[None]] = set()
         self._changing = asyncio.Lock()
 
-    def frame(self) -> bytes:
-        """All that a screen shows of it."""
+    def page(self) -> dict[str, Any]:
+        """All that a screen shows of it, as JSON can hold it."""
         wizards = [
             {
                 "name": name,
@@ -74,7 +74,12 @@ class Wizards:
             for name, wizard in self._wizards.items()
         ]
         session = None if self._session is None else self._session.page()
-        return json_frame({"type": "wizard", "wizards": wizards, "broken": self._broken, "session": session})
+        shown: dict[str, Any] = plain({"wizards": wizards, "broken": self._broken, "session": session})
+        return shown
+
+    def frame(self) -> bytes:
+        """The same for the WebSocket."""
+        return json_frame({"type": "wizard", **self.page()})
 
     async def run(self) -> None:
         """Lead whatever was started, until cancelled."""
