@@ -54,7 +54,14 @@ def console_access(host: str, port: int, certificates: Path | None) -> Access:
     return access
 
 
-def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:
+def attendants(
+    host: str,
+    port: int,
+    certificates: Path | None,
+    *,
+    no_console: bool,
+    scenario: tuple[str, Path] | None = None,
+) -> list[Attendant]:
     """The console beside a run; nothing where none is wanted.
 
     Raises:
@@ -62,7 +69,7 @@ def attendants(host: str, port: int, certificates: Path | None, no_console: bool
     """
     if no_console:
         return []
-    return [attendant(console_access(host, port, certificates))]
+    return [attendant(console_access(host, port, certificates), scenario)]
 
 
 def _free(host: str, first: int) -> int:
