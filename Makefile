@@ -46,8 +46,8 @@ test: $(CORE) $(EXTRAS)
 	@$(BIN)/python -m pytest -q -n 2
 
 test-all: $(CORE) $(EXTRAS)
-	@$(BIN)/python -m pytest -q -n 2 -m "not hardware" --ignore tests/closed_loop/live
-	@$(BIN)/python -m pytest -q -m "not hardware" tests/closed_loop/live
+	@$(BIN)/python -m pytest -q -n 2 -m "not hardware" --ignore tests/closed_loop/live --ignore tests/browser
+	@$(BIN)/python -m pytest -q -m "not hardware" tests/closed_loop/live tests/browser
 
 check: $(CORE) $(EXTRAS)
 	@$(BIN)/ruff format --check .

@@ -25,6 +25,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import cv2  # noqa: E402
 from bench import (  # noqa: E402
     campaign,
+    console,
     crowd,
     deaths,
     fault_flights,
@@ -66,6 +67,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     {
         "live": live.measure,
         "stop": stop.measure,
+        "console": console.measure,
         "campaign": campaign.measure,
         "deaths": deaths.measure,
         "live_faults": live_faults.measure,

@@ -47,14 +47,22 @@ def console_access(host: str, port: int, certificates: Path | None) -> Access:
                     f"{file} is not there: `groundstation certificates --out {certificates}` makes it"
                 )
         observer, operator = new_token(), new_token()
-        access = Access(host, _free(host, port), (), observer, operator, *map(str, pair))
+        names = _names_of(pair[0])
+        access = Access(host, _free(host, port), names, observer, operator, *map(str, pair))
     trouble = access.trouble()
     if trouble:
         raise UsageError(trouble)
     return access
 
 
-def attendants(host: str, port: int, certificates: Path | None, no_console: bool) -> list[Attendant]:
+def attendants(
+    host: str,
+    port: int,
+    certificates: Path | None,
+    *,
+    no_console: bool,
+    scenario: tuple[str, Path] | None = None,
+) -> list[Attendant]:
     """The console beside a run; nothing where none is wanted.
 
     Raises:
@@ -62,7 +70,24 @@ def attendants(host: str, port: int, certificates: Path | None, no_console: bool
     """
     if no_console:
         return []
-    return [attendant(console_access(host, port, certificates))]
+    return [attendant(console_access(host, port, certificates), scenario)]
+
+
+def _names_of(certificate: Path) -> tuple[str, ...]:
+    """Names and addresses that a certificate is for: those that a browser may call this console by.
+
+    Raises:
+        UsageError: It is no certificate.
+    """
+    from cryptography import x509  # only where a network is let in
+
+    try:
+        read = x509.load_pem_x509_certificate(certificate.read_bytes())
+        found = read.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except (ValueError, OSError, x509.ExtensionNotFound) as error:
+        raise UsageError(f"{certificate} is no certificate with names of this machine: {error}") from error
+    names = found.get_values_for_type(x509.DNSName)
+    return (*names, *map(str, found.get_values_for_type(x509.IPAddress)))
 
 
 def _free(host: str, first: int) -> int:

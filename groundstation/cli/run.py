@@ -1,5 +1,6 @@
 """``groundstation run``: fly the vehicles of a rig, or a scenario, live or in lockstep."""
 
+import json
 import sys
 import time
 from pathlib import Path
@@ -97,9 +98,16 @@ def run(
             raise UsageError("--hub-port goes with a rig: nobody commands a scenario from outside")
         from groundstation.cli.run_scenario import Asked, run_scenario
 
-        beside = [] if lockstep else attendants(console_host, console_port, console_certificates, no_console)
+        scenario = made(content, file)
+        beside = [] if lockstep else attendants(
+            console_host,
+            console_port,
+            console_certificates,
+            no_console=no_console,
+            scenario=(json.dumps(content), file.resolve()),
+        )  # fmt: skip
         asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know, tuple(beside))
-        raise typer.Exit(run_scenario(made(content, file), asked))
+        raise typer.Exit(run_scenario(scenario, asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
     loaded = parse_rig(text, file)
@@ -123,7 +131,7 @@ def run(
             with RunProgress(duration) as update:
                 faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
         else:
-            beside = attendants(console_host, console_port, console_certificates, no_console)
+            beside = attendants(console_host, console_port, console_certificates, no_console=no_console)
             live = LiveRun(loaded, text, file, recording, hub_port=hub_port, attendants=beside)
             run_live(live, duration, headless=headless or not sys.stdout.isatty())
             faults, trouble = live.faults, live.launcher.recording_trouble

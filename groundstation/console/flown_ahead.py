@@ -15,7 +15,7 @@ from groundstation.parts.fusion.messages import VehicleState
 
 ACTION = "go_to"
 """What can be flown ahead."""
-LONGEST_S = 60.0
+LONGEST_S = 180.0
 
 
 class FlownAhead:

@@ -1,6 +1,7 @@
 """The console of a flight: a process beside the rig's own, fed by the record streams."""
 
 import asyncio
+import json
 import os
 import time
 from collections.abc import Iterable, Mapping
@@ -14,6 +15,7 @@ from groundstation.console.desk import Desk, Tokens
 from groundstation.console.events import Events
 from groundstation.console.feed import Feed
 from groundstation.console.flown_ahead import FlownAhead
+from groundstation.console.limit_watch import LimitWatch
 from groundstation.console.options import Options
 from groundstation.console.rig_page import rig_page
 from groundstation.console.server import Console, make_app
@@ -24,6 +26,7 @@ from groundstation.declarations.rig import Rig
 from groundstation.launch.orders import Orders
 from groundstation.launch.process import NICENESS, stop_when_asked
 from groundstation.rig.read import parse_rig
+from groundstation.scenario.loading import Scenario, made
 
 MOST_BATCHES = 4096
 ALIVE_S, LOOK_S = 0.5, 0.02
@@ -37,13 +40,16 @@ class LiveSource:
     Args:
         rig: The rig.
         bus: Session with its hub.
+        scenario: That it flies; None for none.
     """
 
-    def __init__(self, rig: Rig, bus: ZenohBus) -> None:
+    def __init__(self, rig: Rig, bus: ZenohBus, scenario: Scenario | None = None) -> None:
         self.vehicles = tuple(rig.vehicles)
         self.feed = Feed(rig.tables.payloads)
         self.events = Events(self.feed)
         self.page: dict[str, Any] = {**rig_page(rig), "kind": "live"}
+        self._limits = None if scenario is None else LimitWatch(scenario, self.feed)
+        self._now_ns = 0
         self._batches = bus.collect(f"{RECORD}/*", MOST_BATCHES)
 
     def step(self) -> int:
@@ -51,10 +57,11 @@ class LiveSource:
         now_ns = time.monotonic_ns()
         for _, batch in self._batches.take():
             self.feed.take_batch(batch, now_ns)
+        self._now_ns = now_ns
         return now_ns
 
     def extra(self) -> dict[str, Any]:
-        return {}
+        return {} if self._limits is None else {"limits": self._limits.shown(self._now_ns)}
 
     def control(self, asked: Mapping[str, Any]) -> None:
         raise ValueError(f"{asked.get('what')!r:.40}: time goes on by itself in a flight")
@@ -85,7 +92,11 @@ def run(orders: Orders) -> None:
 
 
 async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop_bus: ZenohBus) -> None:
-    source = LiveSource(rig, bus)
+    scenario = None
+    if options.scenario is not None:
+        content, path = options.scenario
+        scenario = made(json.loads(content), path)
+    source = LiveSource(rig, bus, scenario)
     desk = Desk(bus, stop_bus, source.vehicles, rig.tables.actions, Tokens(options.secret))
     ahead = FlownAhead(rig, source.feed, orders)
     console = Console(source, rig.tables, options.access, desk, ahead.fly if ahead.can_fly else None)

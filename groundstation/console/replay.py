@@ -43,11 +43,12 @@ class ReplaySource:
     Args:
         recording: Open for as long as this lives.
         rig: As it was recorded.
-        other: A recording that is laid over it, from its beginning; None for none.
+        other: A recording that is laid over it, from its beginning; None for none. It is read and closed.
     """
 
     def __init__(self, recording: Recording, rig: Rig, other: Recording | None = None) -> None:
         self._recording = recording
+        self.tables = rig.tables
         self._payloads = rig.tables.payloads
         self.vehicles = tuple(rig.vehicles)
         self.feed = Feed(self._payloads)
@@ -59,7 +60,10 @@ class ReplaySource:
         self._all_events: list[Event] = list(self.events.kept)
         if len(self._all_events) > MOST_SHOWN:
             self.events.keep(lambda event: event["kind"] != "fix" or not event["used"])
-        self._ghosts = {} if other is None else _tracks(other, self.vehicles)
+        self._ghosts = {}
+        if other is not None:
+            with other:
+                self._ghosts = _tracks(other, self.vehicles)
         self._place_ns = recording.start_ns
         self._factor, self._is_playing = 1.0, False
         self._looked_s = time.monotonic()

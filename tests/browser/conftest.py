@@ -1,4 +1,4 @@
-"""A flight with its console, and Chromium without a screen; where there is no Chromium the tests are skipped."""
+"""A flight with its console, and Chromium without a screen; without Chromium the tests are skipped."""
 
 import json
 import os

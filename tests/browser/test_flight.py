@@ -86,7 +86,7 @@ def test_a_goal_is_pointed_at_flown_ahead_and_then_sent(page, api):
     box = table.bounding_box()
     page.mouse.click(box["x"] + 0.42 * box["width"], box["y"] + 0.42 * box["height"])
     plan = page.get_by_role("region", name="Flown ahead")
-    plan.get_by_text("settled after").wait_for(timeout=120 * S)
+    plan.get_by_text("settled after").wait_for(timeout=200 * S)
     goal = api(page)["vehicles"]["alpha"]["control"]
     plan.get_by_role("button", name="Send").click()
     plan.wait_for(state="hidden")  # only where the vehicle has accepted it

@@ -85,7 +85,7 @@ def _trouble(bench: Bench, kind: str, count: int) -> str:
     """Why so many could not fly; empty if they did."""
     rig, path = bench.folder / f"crowd_{count}.toml", bench.folder / f"crowd_{count}.mcap"
     rig.write_text(rig_text(kind, count), encoding="utf-8")
-    words = ["run", str(rig), "--headless", "--duration", str(FLOWN_S), "--record", str(path)]
+    words = ["run", str(rig), "--headless", "--no-console", "--duration", str(FLOWN_S), "--record", str(path)]
     done = subprocess.run(
         [sys.executable, "-m", "groundstation", *words], cwd=ROOT, capture_output=True, text=True, check=False
     )

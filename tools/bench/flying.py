@@ -51,13 +51,16 @@ class Flying:
         (found,) = [run for run in find_running() if run.pid == self.process.pid]
         return found
 
-    def wait_for(self, pattern: str, groups: set[str] | None = None, within_s: float = READY_S) -> None:
+    def wait_for(self, pattern: str, groups: set[str] | None = None, within_s: float = READY_S) -> str:
         """Wait for a line with the pattern; where groups are given, for one with each as its first group.
+
+        Returns:
+            The first group of the last line that was waited for; empty where the pattern has none.
 
         Raises:
             NotInTimeError: It did not come.
         """
-        waiting = {""} if groups is None else set(groups)
+        waiting, last_group = {""} if groups is None else set(groups), ""
         until_s = time.monotonic() + within_s
         while waiting:
             try:
@@ -69,7 +72,9 @@ class Flying:
             self._bench.say(line[:100])
             found = re.search(pattern, line)
             if found is not None:
-                waiting.discard("" if groups is None else found[1])
+                last_group = found[1] if found.re.groups else ""
+                waiting.discard("" if groups is None else last_group)
+        return last_group
 
 
 @contextmanager

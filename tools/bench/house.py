@@ -79,6 +79,8 @@ def run_once(checkout: Path, rig: Path, seconds: float, settle_s: float) -> Cost
     with tempfile.TemporaryDirectory(prefix="house_") as folder:
         command = [str(checkout / ".venv" / "bin" / "groundstation"), "run", str(checkout / rig)]
         command += ["--headless", "--record", f"{folder}/run.mcap"]
+        if (checkout / "groundstation" / "console").is_dir():
+            command.append("--no-console")  # earlier commits have none; its own subject measures it
         begin_s = time.monotonic()
         process = subprocess.Popen(
             command,

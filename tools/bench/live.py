@@ -90,7 +90,16 @@ def _state_ms_beside_a_load(bench: Bench, rig: Rig) -> list[float]:
 
 
 def _fly(bench: Bench, path: Path, duration_s: float) -> None:
-    words = ["run", str(RIG), "--headless", "--duration", str(duration_s), "--record", str(path)]
+    words = [
+        "run",
+        str(RIG),
+        "--headless",
+        "--no-console",
+        "--duration",
+        str(duration_s),
+        "--record",
+        str(path),
+    ]
     command = [sys.executable, "-m", "groundstation", *words]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

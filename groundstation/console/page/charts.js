@@ -43,10 +43,11 @@ export class Charts {
       const residuals = Object.keys(this.rig.vehicles).flatMap((name) => Object.keys(AXES).map((axis) => `${name}: residual ${axis}`));
       this.known = [...residuals, ...topics.flatMap((topic) => topic.fields)];
       document.getElementById("fields").replaceChildren(...this.known.map((name) => el("option", {value: name})));
-    } catch { setTimeout(() => this.learn(), 2000); }
+    } catch { this.known = this.known ?? []; }
   }
 
-  addTyped() {
+  async addTyped() {
+    await this.learn();                    // topics come with a flight, not before it
     const field = document.getElementById("field"), wanted = field.value.trim();
     if (!wanted) return;
     const exact = (this.known ?? []).find((name) => name === wanted);

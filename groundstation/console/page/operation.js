@@ -71,7 +71,7 @@ export class Operation {
     set(document.getElementById("take-control"), this.holds ? "Give control" : "Take control");
     for (const [name, vehicle] of Object.entries(state.vehicles)) this.vehicle(name, vehicle);
     this.faults(state);
-    this.scenario(state.scenario);
+    this.scenario(state.scenario, state.limits);
     const recorder = state.recorder;
     set(document.getElementById("recorder"), recorder && this.rig.kind === "live" ? `recording ${(recorder.written_bytes / 1e6).toFixed(1)} MB${recorder.room_s < 3600 ? `, room for ${clock(recorder.room_s)}` : ""}` : "");
   }
@@ -122,14 +122,14 @@ export class Operation {
     this.isLatched = Object.values(state.vehicles).some((v) => v.stop_latched);
   }
 
-  scenario(now) {
+  scenario(now, limits) {
     const box = document.getElementById("scenario");
     box.hidden = !now;
     if (!now) return;
     const time = now.t_s === null ? "" : `, t = ${now.t_s.toFixed(1)} s`;
     const parts = [`${now.state}${time}`, now.waits_for && `waits for ${now.waits_for}`, now.reason].filter(Boolean);
     box.replaceChildren(el("h2", {}, now.name), el("div", {class: now.state === "failed" ? "bad" : ""}, parts.join("; ")),
-      ...(now.limits ?? []).map((limit) => el("div", {class: limit.held === null ? "" : limit.held ? "good" : "bad"}, limit.text)));
+      ...(limits ?? []).map((limit) => el("div", {class: limit.held === null ? "small" : limit.held ? "good" : "bad"}, `${limit.held === null ? "open" : limit.held ? "held" : "FAILED"}: ${limit.text}`)));
   }
 
   async ask(vehicle, action, given = {}) {

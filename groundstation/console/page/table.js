@@ -92,6 +92,7 @@ export class TableView {
     all.forEach(([name, v], i) => this.vehicle(name, v, colour(i)));
     for (const [name, pose] of Object.entries(this.now.ghosts ?? {})) this.outline(pose, shade("--faint"), this.rig.vehicles[name]?.radius_m ?? 0.2, [3, 3]);
     if (this.pointed) this.goal(this.pointed, shade("--ink"), true);
+    window.shownStamp = all[0]?.[1].stamp_ns;   // for whoever measures how old a picture is
   }
 
   ground() {

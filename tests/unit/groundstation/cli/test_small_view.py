@@ -39,7 +39,7 @@ def screen_of(vehicles, width=WIDTH, height=HEIGHT, keys=HELP):
     run = SimpleNamespace(
         rig=SimpleNamespace(name="two mock-ups"),
         monitor=monitor,
-        launcher=SimpleNamespace(waiting_for=[], children=children),
+        launcher=SimpleNamespace(waiting_for=[], children=children, greetings=[]),
         started_s=time.monotonic(),
     )
     out = io.StringIO()

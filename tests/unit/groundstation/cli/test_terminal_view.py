@@ -28,7 +28,9 @@ def run_of(vehicles):
         SimpleNamespace(name="alpha_flight", state="ready", restarts=0),
         SimpleNamespace(name="alpha_sky", state="starting", restarts=2),
     ]
-    launcher = SimpleNamespace(waiting_for=["alpha_sky"], children=children)
+    launcher = SimpleNamespace(
+        waiting_for=["alpha_sky"], children=children, greetings=["console: http://127.0.0.1:8400/"]
+    )
     rig = SimpleNamespace(name="two mock-ups")
     monitor = Monitor(tables, vehicles)
     return SimpleNamespace(rig=rig, monitor=monitor, launcher=launcher, started_s=time.monotonic())
@@ -108,6 +110,8 @@ def test_lines_of_a_log_name_the_vehicles_that_are_known(full, capsys):
     full.monitor.vehicles["beta"].is_known = True
     view.print_vehicles()
     lines = capsys.readouterr().out.splitlines()
+    assert lines.count("console: http://127.0.0.1:8400/") == 1  # as it is, for programs that look for it
+    lines = [line for line in lines if not line.startswith("console: ")]
     assert [line.partition(" s  ")[2] for line in lines] == [
         "alpha: flying",
         "starting: waiting for alpha_sky",
