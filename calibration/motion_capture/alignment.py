@@ -30,8 +30,8 @@ NAMES = ("origin_x", "origin_y", "yaw", "pivot_x", "pivot_y", "pivot_yaw", "dela
 UNITS = ("m", "m", "rad", "m", "m", "rad", "s")
 DELAY_SIGMA_S = 0.02
 """Before the data speak: a mock-up that hardly moves must not make the rest unknown."""
-OUTLIER = 4.0
-"""Sigmas at which a pair begins to count less: markers are swapped, pictures mistaken."""
+OUTLIER, ROUNDS = 5.0, 6
+"""Sigmas from which a pair is left out, and how often that is decided anew: markers are swapped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,18 +90,34 @@ def align(pairs: Pairs) -> Alignment:
             "are needed"
         )
 
-    def left(value: Array) -> Array:
-        return np.append(
-            (residuals(value, pairs) / pairs.sigma[:, [0, 0, 1]]).ravel(), value[6] / DELAY_SIGMA_S
-        )
+    value, kept = _guess(pairs), np.ones(len(pairs), dtype=np.bool_)
+    for _ in range(ROUNDS):
+        value, jacobian = _fit(_some(pairs, kept), value)
+        worst = np.abs(residuals(value, pairs) / pairs.sigma[:, [0, 0, 1]]).max(axis=1)
+        # the sources may be worse than they state: what is usual is no outlier
+        fits = worst < OUTLIER * max(1.0, float(np.median(worst)))
+        if fits.sum() < LEAST_PAIRS or (fits == kept).all():
+            break
+        kept = fits
+    weighed = _weighed(value, _some(pairs, kept))[:-1]
+    ratio = float((weighed**2).sum()) / max(1, weighed.size - len(NAMES))
+    sigma = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)) * max(1.0, ratio))
+    return Alignment(value, sigma, ratio)
 
-    found = least_squares(left, _guess(pairs), x_scale="jac", loss="huber", f_scale=OUTLIER)
-    jacobian = np.asarray(found.jac)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    weighed = left(found.x)[:-1]
-    ratio = float((weighed[np.abs(weighed) < OUTLIER] ** 2).sum()) / max(1, weighed.size - len(NAMES))
-    sigma = np.sqrt(np.diag(covariance) * max(1.0, ratio))
-    return Alignment(found.x, sigma, ratio)
+
+def _some(pairs: Pairs, kept: NDArray[np.bool_]) -> Pairs:
+    return Pairs(pairs.seen[kept], pairs.pose[kept], pairs.velocity[kept], pairs.sigma[kept])
+
+
+def _weighed(value: Array, pairs: Pairs) -> Array:
+    """Residuals over their sigmas, and the delay over what is believed beforehand."""
+    return np.append((residuals(value, pairs) / pairs.sigma[:, [0, 0, 1]]).ravel(), value[6] / DELAY_SIGMA_S)
+
+
+def _fit(pairs: Pairs, value: Array) -> tuple[Array, Array]:
+    """The best value, and the Jacobian there; a pair that is far off pulls no harder than one that is off."""
+    found = least_squares(lambda x: _weighed(x, pairs), value, x_scale="jac", loss="huber", f_scale=OUTLIER)
+    return found.x, np.asarray(found.jac)
 
 
 def residuals(value: Array, pairs: Pairs) -> Array:

@@ -107,6 +107,7 @@ class GuidedPictures:
         self._seen = np.zeros(CELLS)
         self._drawn: list[tuple[float, float]] = []
         self._places = LiveCurve("where pictures were taken")
+        self.places_m: list[tuple[float, float]] = []
 
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle."""
@@ -124,12 +125,15 @@ class GuidedPictures:
 
     def advice(self, now_s: float) -> Advice:
         """Return what to do now."""
-        known = {
+        return self.steps.advice(now_s, self.known())
+
+    def known(self) -> dict[str, float]:
+        """The quantities of the goals."""
+        return {
             "pictures": float(len(self.fitted)),
             "pictures_aside": float(len(self.checked)),
             "covered": float((self._seen >= 3).mean()),
         }
-        return self.steps.advice(now_s, known)
 
     def pictures(self) -> Sequence[Drawing]:
         """Return where in the picture stars were seen, and from where."""
@@ -187,6 +191,7 @@ class GuidedPictures:
         self._drawn += zip(spots.u_px.tolist(), spots.v_px.tolist(), strict=True)
         if pose is not None:
             self._places.add(pose[0], pose[1])
+            self.places_m.append((pose[0], pose[1]))
         columns, rows = CELLS
         u = np.clip((spots.u_px / self.camera.width * columns).astype(int), 0, columns - 1)
         v = np.clip((spots.v_px / self.camera.height * rows).astype(int), 0, rows - 1)

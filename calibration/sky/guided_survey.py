@@ -30,7 +30,9 @@ from groundstation.star_tracking.tracker import StarTracker
 
 LANE_M, STRIDE_M, MARGIN_M = 0.6, 0.5, 0.35
 """Lanes of the sweep, places along them, and what is left to the edges."""
-ANCHORS, ANCHOR_SIGHTINGS = 4, 4
+ANCHORS, LEAST_ANCHORS, ANCHOR_SIGHTINGS = 24, 4, 4
+REACH_M = 0.6
+"""A place of the table counts as swept when a picture was taken so near."""
 ANCHOR_SIGMA_M = 1e-3
 """How well a star of the old list is believed where the list states nothing."""
 STEPS: tuple[Step, ...] = (
@@ -39,10 +41,10 @@ STEPS: tuple[Step, ...] = (
         "Lead the mock-up slowly in lanes over the whole table: each picture overlaps the one before.",
         False,
         (
-            Goal("pictures", 60.0, "pictures", is_amount=True),
-            Goal("travelled_m", 4.0, "m", is_amount=True),
+            Goal("pictures", 40.0, "pictures", is_amount=True),
+            Goal("table", 0.9, "of the table", is_amount=True),
         ),
-        600.0,
+        900.0,
     ),
     Step(
         CHECK,
@@ -83,6 +85,22 @@ class GuidedSurvey(GuidedPictures):
     def __init__(self, rig: Rig, vehicle: str) -> None:
         sweep = lanes(rig)
         super().__init__(rig, vehicle, Plan(STEPS, {"sweep": sweep, CHECK: sweep}, every_s=8.0))
+        table = rig.table
+        self._middles_m = np.array(
+            [
+                (x_m, y_m)
+                for x_m in _places(table.x_min_m, table.x_max_m, STRIDE_M)
+                for y_m in _places(table.y_min_m, table.y_max_m, LANE_M)
+            ]
+        )
+
+    def known(self) -> dict[str, float]:
+        """The quantities of the goals: also how much of the table has been swept."""
+        known = super().known()
+        if self.places_m:
+            away_m = np.linalg.norm(self._middles_m[:, None] - np.array(self.places_m)[None], axis=2)
+            known["table"] = float((away_m.min(axis=1) < REACH_M).mean())
+        return known
 
     def outcome(self) -> Outcome:
         """Return the star list, tried on the pictures set aside.
@@ -150,15 +168,15 @@ def _anchors(pictures: Sequence[Spots], catalogue: StarCatalogue, camera: Camera
             sightings.setdefault(star, []).append((away_px, number, u_px, v_px))
     # where a star is nearest to the middle the pictures around show it, too
     seen = {star: min(rows)[1:] for star, rows in sightings.items() if len(rows) >= ANCHOR_SIGHTINGS}
-    if len(seen) < ANCHORS:
+    if len(seen) < LEAST_ANCHORS:
         raise CalibrationRefusedError(
-            f"{len(seen)} stars of the rig's list were recognised often enough, {ANCHORS} are needed to hold "
-            "the frame"
+            f"{len(seen)} stars of the rig's list were recognised often enough, {LEAST_ANCHORS} are needed "
+            "to hold the frame"
         )
     stars = np.array(sorted(seen))
     place = np.column_stack((catalogue.x_m[stars], catalogue.y_m[stars]))
     chosen = [max(itertools.combinations(range(len(stars)), 2), key=lambda pair: _apart(place, pair))[0]]
-    while len(chosen) < ANCHORS:  # each the farthest from those before it
+    while len(chosen) < min(ANCHORS, len(stars)):  # each the farthest from those before it
         distance = np.linalg.norm(place[:, None] - place[None, chosen], axis=2).min(axis=1)
         chosen.append(int(distance.argmax()))
     return [

@@ -1,4 +1,4 @@
-"""A guided calibration that the console of a real run leads: who may, what it asks for, how a stop ends it."""
+"""A guided calibration led by the console of a real run: who may, what it asks for, how a stop ends it."""
 
 import re
 import time
