@@ -61,7 +61,7 @@ def test_a_network_is_not_let_in_without_certificates(host: str) -> None:
 
 
 def test_a_folder_without_certificates_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="server.pem is not there"):
+    with pytest.raises(UsageError, match=r"server\.pem is not there"):
         console_access(HOST, 8400, tmp_path)
     for name in ("server.pem", "server.key"):
         (tmp_path / name).write_text("no certificate")
