@@ -25,6 +25,8 @@ COMMANDS: dict[str, Row] = {
     "console": Command("groundstation.cli.console:app", "Look at a recording in the web console."),
     "recording": Command("groundstation.cli.recording:app", "Look into recordings, recover a torn one."),
     "report": Command("groundstation.cli.report:app", "Draw the figures of a recording."),
+    "status": Command("groundstation.cli.status:app", "Show every running rig on one screen."),
+    "watch": Command("groundstation.cli.watch:app", "Show what a running rig publishes on a topic."),
     "request": Command(
         "groundstation.cli.request:app", "Ask something of a running vehicle, or stop all: arm, stop, go_to."
     ),
