@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from groundstation.cli.command import Command, Group
+from groundstation.cli.completion import typed
 from groundstation.cli.extensions import BrokenCommandError, Row, extension, extensions
 from groundstation.cli.plain_words import speak_any_locale
 
@@ -71,7 +72,7 @@ def build(words: list[str]) -> typer.Typer:
     """
     import typer  # here, so that Ctrl-C is understood before anything heavy is loaded
 
-    app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+    app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
     @app.callback()
     def root() -> None:
@@ -159,7 +160,7 @@ def call(words: list[str]) -> int:
         os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
-        app = build(words)
+        app = build(spelled(typed(os.environ) or words))
         check_numbers(app)
         app(words, prog_name="groundstation")
     except SystemExit as done:
