@@ -36,6 +36,9 @@ COMMANDS: dict[str, Row] = {
     "faults": Command("groundstation.cli.faults:app", "Show modes, what moves them, and every fault."),
     "demo": Command("groundstation.cli.demo:app", "Make small data sets of every kind to try commands on."),
     "doctor": Command("groundstation.cli.doctor:app", "Check this machine before a flight day."),
+    "certificates": Command(
+        "groundstation.cli.certificates:app", "Make certificates for the console and for other hosts."
+    ),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "reproduce": Command("groundstation.cli.reproduce:app", "Run published experiments again."),

@@ -47,6 +47,7 @@ def home(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @needs_bash
 def test_commands_options_and_members_of_groups(home):
     assert completed(home, "rep") == ["replay", "report", "reproduce"]
@@ -57,6 +58,7 @@ def test_commands_options_and_members_of_groups(home):
     assert completed(home, "nothing-like-it", "--x") == []
 
 
+@pytest.mark.slow
 @needs_bash
 def test_topics_and_fields_of_rigs_that_run(home, fake_run):
     shutil.copytree(fake_run.folder / "groundstation", home / "groundstation", dirs_exist_ok=True)
@@ -65,6 +67,7 @@ def test_topics_and_fields_of_rigs_that_run(home, fake_run):
     shutil.rmtree(home / "groundstation")
 
 
+@pytest.mark.slow
 @needs_bash
 def test_the_installer_writes_into_the_home_folder_alone(tmp_path):
     done = bash(tmp_path, "groundstation --install-completion; true")

@@ -39,6 +39,7 @@ def published(fake_run):
     thread.join()
 
 
+@pytest.mark.slow
 def test_lines_are_csv_that_can_be_read_back_and_none_is_missing(published):
     process = published.command("watch", "alpha/state", "--count", "30")
     output, errors = process.communicate(timeout=90)
@@ -66,6 +67,7 @@ def test_every_so_often_the_newest_is_shown(published, groundstation):
     assert all(later > earlier + 1.5 for earlier, later in itertools.pairwise(stamps))
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_it_cleanly(published):
     process = published.command("watch", "alpha/state")
     assert process.stdout.readline().startswith("stamp_s,")
@@ -75,6 +77,7 @@ def test_ctrl_c_ends_it_cleanly(published):
     assert (process.returncode, errors) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_ends_it(published):
     process = published.command("watch", "alpha/state")
     process.stdout.readline()
@@ -84,6 +87,7 @@ def test_a_reader_that_goes_away_ends_it(published):
     process.stderr.close()
 
 
+@pytest.mark.slow
 def test_the_end_of_the_rig_ends_it(published):
     process = published.command("watch", "alpha/state.status")
     assert process.stdout.readline() == "stamp_s,status\n"
@@ -93,6 +97,7 @@ def test_the_end_of_the_rig_ends_it(published):
     assert (process.returncode, errors) == (0, "a rig has ended\n")
 
 
+@pytest.mark.slow
 def test_what_is_not_published_is_said_and_what_comes_then_is_shown(fake_run):
     process = fake_run.command("watch", "lease.holder", "--count", "1")
     assert process.stderr.readline().startswith("nothing has been published there")
@@ -101,6 +106,7 @@ def test_what_is_not_published_is_said_and_what_comes_then_is_shown(fake_run):
     assert (process.returncode, output) == (0, "stamp_s,holder\n0.000000000,anna\n")
 
 
+@pytest.mark.slow
 def test_on_a_terminal_it_is_a_table_that_fits(published):
     ours, theirs = pty.openpty()
     process = published.command("watch", "alpha/state.position_table_m", "--count", "2", stdout=theirs)
