@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.bridges.foxglove import PORT as FOXGLOVE_PORT
 from groundstation.cli.console_option import (
     FIRST_PORT,
     HOST,
@@ -18,6 +19,7 @@ from groundstation.cli.console_option import (
     attendants,
 )
 from groundstation.cli.live_view import run_live
+from groundstation.cli.run_beside import beside_of
 from groundstation.cli.run_files import check_recording, finished_files
 from groundstation.cli.run_progress import RunProgress
 from groundstation.core.library import default_core
@@ -68,6 +70,23 @@ def run(
     console_host: ConsoleHost = HOST,
     console_port: ConsolePort = FIRST_PORT,
     console_certificates: Certificates = None,
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Serve live data to Foxglove and Lichtblick, on loopback.")
+    ] = False,
+    foxglove_port: Annotated[
+        int, typer.Option(help="Where; 0: a free port.", min=0, max=65535)
+    ] = FOXGLOVE_PORT,
+    ros2: Annotated[
+        str | None, typer.Option(help="Bridge to ROS 2 by the router there, e.g. tcp/127.0.0.1:7447.")
+    ] = None,
+    ros2_domain: Annotated[int, typer.Option(help="Domain of ROS 2.", min=0, max=232)] = 0,
+    guests: Annotated[
+        str | None,
+        typer.Option(help="Let other hosts join the bus at this address, e.g. 0.0.0.0 or 192.168.1.20:7449."),
+    ] = None,
+    guests_certificates: Annotated[
+        Path | None, typer.Option(help="Folder that `groundstation certificates` made.")
+    ] = None,
 ) -> None:
     """Fly the vehicles of a rig until Ctrl-C, or for --duration seconds; or a scenario until it is over.
 
@@ -83,7 +102,11 @@ def run(
     Example: groundstation run examples/scenarios/go_to.toml --lockstep --report report
 
     Example: groundstation run examples/rigs/drawn_fixes.toml --lockstep --duration 120 --report report
+
+    Example: groundstation run examples/rigs/two_mock_ups.toml --foxglove
     """
+    port = foxglove_port if foxglove else None
+    bridges, joined = beside_of(port, ros2, ros2_domain, guests, guests_certificates, is_live=not lockstep)
     if compare is not None:
         if report is None:
             raise UsageError("--compare goes with --report: the recording is drawn beside the run")
@@ -96,6 +119,8 @@ def run(
             raise UsageError("--duration goes with a rig: a scenario has its own")
         if hub_port:
             raise UsageError("--hub-port goes with a rig: nobody commands a scenario from outside")
+        if joined is not None:
+            raise UsageError("--guests goes with a rig: nobody commands a scenario from outside")
         from groundstation.cli.run_scenario import Asked, run_scenario
 
         scenario = made(content, file)
@@ -106,7 +131,9 @@ def run(
             no_console=no_console,
             scenario=(json.dumps(content), file.resolve()),
         )  # fmt: skip
-        asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know, tuple(beside))
+        asked = Asked(
+            lockstep, headless, seed, record, report, compare, hardware, i_know, (*beside, *bridges)
+        )
         raise typer.Exit(run_scenario(scenario, asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
@@ -132,7 +159,10 @@ def run(
                 faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
         else:
             beside = attendants(console_host, console_port, console_certificates, no_console=no_console)
-            live = LiveRun(loaded, text, file, recording, hub_port=hub_port, attendants=beside)
+            live = LiveRun(
+                loaded, text, file, recording,
+                hub_port=hub_port, attendants=(*beside, *bridges), guests=joined,
+            )  # fmt: skip
             run_live(live, duration, headless=headless or not sys.stdout.isatty())
             faults, trouble = live.faults, live.launcher.recording_trouble
     finally:

@@ -23,10 +23,12 @@ def test_the_kernel_lists_what_is_listened_on():
 def test_by_default_nothing_but_loopback_is_listened_on_and_status_and_watch_see_the_flight(
     launch, two_drawn
 ):
-    run = launch(two_drawn)
+    run = launch(two_drawn, has_console=True)
     run.wait_until_flying()
+    run.rewind()
+    run.wait_for("console: http://127.0.0.1:")
     listened = listening.listened_on(run.every_pid())
-    assert len(listened) >= 3, "hub, serial lines and CAN bus of the laboratory"
+    assert len(listened) >= 3, "hub, console, and the laboratory's serial lines and CAN bus"
     assert not [each for each in listened if not listening.is_loopback(each[1])]
 
     status = run._call("status", "--json")
