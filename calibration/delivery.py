@@ -4,11 +4,13 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 from calibration.outcome import CalibrationRefusedError, Outcome
-from calibration.result import Provenance
+from calibration.result import Provenance, quantity_lines
 from groundstation.declarations.errors import UsageError
+from groundstation.declarations.guide import Found
 from groundstation.files.json_file import json_text
 from groundstation.files.png import png_of
 from groundstation.files.writing import Content, write_files
@@ -64,3 +66,18 @@ def deliver(
     for warning in (*aside, *found.warnings):
         sys.stderr.write(f"{provenance.recording}: {warning}.\n")
     print(found.summary)
+
+
+def deliver_guided(found: Found, out: Path, source: str, sha256: str, made_utc: datetime) -> None:
+    """Write the result of a guided calibration with what belongs to it; print summary and verification.
+
+    Raises:
+        FileError: A file cannot be written; then none is.
+    """
+    write_files(found.written(out, source, sha256, made_utc))
+    for warning in found.warnings:
+        sys.stderr.write(f"{source}: {warning}.\n")
+    print(found.summary)
+    if found.verification:
+        print(f"Verified by {found.verified_by}:")
+        print("\n".join(f"  {line}" for line in quantity_lines(found.verification)))

@@ -7,54 +7,9 @@ and returns which step is due and what is missing. Steps are rows of a table.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
-
-@dataclass(frozen=True, slots=True)
-class Goal:
-    """One number that must fall below (or, for amounts, rise above) a limit."""
-
-    quantity: str
-    limit: float
-    unit: str
-    is_amount: bool = False
-
-    def share(self, value: float) -> float:
-        """Return how far it is reached, 0 to 1; a sigma falls with the root of the data, so squared."""
-        if self.is_amount:
-            return max(0.0, min(1.0, value / self.limit))
-        return 1.0 if value <= self.limit else (self.limit / value) ** 2
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One row: an instruction and what ends it."""
-
-    name: str
-    instruction: str
-    is_rest: bool
-    goals: tuple[Goal, ...]
-    longest_s: float
-    """After this long it is given up, with what is known by then."""
-
-
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """What the operator is to do now."""
-
-    step: Step | None
-    """None when all is done."""
-    done: float
-    """Share of the step, 0 to 1."""
-    missing: str
-    """The goal that is furthest away, in words; empty when none is."""
-    is_new: bool
-    """Whether the step has just begun."""
-    ended: str = ""
-    """How the step before ended, if this one has just begun."""
-    note: str = ""
-    """What else the operator has to know: that it moves by itself, or what it waits for."""
+from groundstation.declarations.guide import Advice, Goal, Step
 
 
 class GuidedSequence:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from groundstation.declarations.guide import Number
 from groundstation.files.toml_file import Value, toml_lines, toml_table
 
 
@@ -34,13 +35,14 @@ class Provenance:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationResult:
-    """Quantities by name with their provenance, residual and whatever else should be kept."""
+    """Quantities by name with their provenance, residual, verification and whatever else should be kept."""
 
     title: str
     provenance: Provenance
     quantities: Mapping[str, Quantity]
     residual: Mapping[str, Quantity] = field(default_factory=dict)
     notes: Mapping[str, float | int | str | bool | Sequence[str]] = field(default_factory=dict)
+    verification: Mapping[str, Quantity] = field(default_factory=dict)
 
     def to_toml(self) -> str:
         """Return the result as TOML; the names are stable, other programs read them."""
@@ -50,14 +52,15 @@ class CalibrationResult:
             "recording_sha256": self.provenance.recording_sha256,
         }
         lines = [f"# {self.title}", "", *toml_lines({**origin, **self.notes})]
-        for table, quantities in (("", self.quantities), ("residual.", self.residual)):
+        tables = (("", self.quantities), ("residual.", self.residual), ("verification.", self.verification))
+        for table, quantities in tables:
             for name, quantity in quantities.items():
                 sigma = {} if math.isnan(quantity.sigma) else {"std": quantity.sigma}
                 lines += toml_table(table + name, {"value": quantity.value, **sigma, "unit": quantity.unit})
         return "\n".join(lines) + "\n"
 
 
-def quantity_lines(quantities: Mapping[str, Quantity]) -> list[str]:
+def quantity_lines(quantities: Mapping[str, Number]) -> list[str]:
     """Return quantities in words, a line each."""
     lines = []
     for name, quantity in quantities.items():

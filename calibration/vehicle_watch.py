@@ -56,6 +56,11 @@ class VehicleWatch:
         return 0.0 if self._floats else self._rest_s
 
     @property
+    def wants_flight(self) -> bool:
+        """Whether it flies, or takes off as soon as it may."""
+        return self._ruling is not None and (self._ruling.flight_wanted or self._ruling.is_in_flight)
+
+    @property
     def is_on_its_way_down(self) -> bool:
         """Whether a request to fly would come too early."""
         return self.mode in (Mode.LANDING, Mode.LOST)

@@ -1,29 +1,30 @@
-"""The IMU of a running vehicle calibrated step by step: rest, turns, flights, until there is enough data."""
+"""The IMU of a running vehicle calibrated step by step: rest, turns, flights, and a flight to verify by."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import ClassVar
+from collections.abc import Iterator, Mapping, Sequence
 
-from calibration.guidance import Advice, Goal, GuidedSequence, Step
+from calibration.guided_steps import GuidedSteps
+from calibration.imu.carried_check import GAP_S, Carried, Received, carried, held, held_before, warmed
 from calibration.imu.joint import constants, widened
-from calibration.imu.manoeuvres import Pose, inside, push, turn
-from calibration.outcome import Outcome
-from calibration.result import quantity_lines
-from calibration.vehicle_watch import VehicleWatch
-from calibration.wizards import Wish
+from calibration.live_curve import LiveCurve
+from calibration.manoeuvres import Pose, push, turn
+from calibration.outcome import CalibrationRefusedError, Outcome
+from calibration.result import Quantity, quantity_lines
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step, Wish
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.fusion import error_state as es
 from groundstation.fusion.offline import OfflineSmoother
 from groundstation.parts.fusion.estimation import rig_noise
+from groundstation.parts.fusion.messages import FixAccount
 from groundstation.parts.fusion.part import fusion_node
+from groundstation.parts.fusion.sections import fused_sources
 from groundstation.parts.imu.messages import Imu
-from groundstation.parts.overhead.messages import OverheadFix
-from groundstation.parts.stars.messages import StarFix
 
+CHECK = "check"
 STEPS: tuple[Step, ...] = (
     Step(
         "rest",
@@ -54,10 +55,34 @@ STEPS: tuple[Step, ...] = (
         ),
         240.0,
     ),
+    Step(
+        CHECK,
+        "Go on flying to and fro and turning: this part is kept apart, and judges the result.",
+        False,
+        (
+            Goal("checked_s", 40.0, "s", is_amount=True),
+            Goal("travelled_m", 1.0, "m", is_amount=True),
+            Goal("turned_rad", 3.0, "rad", is_amount=True),
+        ),
+        180.0,
+    ),
 )
-GO_TO_EVERY_S = 9.0
-SETTLE_S = 2.0
-MANOEUVRES = {"turn": turn, "push": push}
+AXES = (("x", 1e3, "mm"), ("y", 1e3, "mm"), ("heading", math.degrees(1.0), "deg"))
+SWING_RAD = 0.75
+WORST_NIS = 9.0
+"""Three times what chance gives: the constants, or their sigmas, do not hold for the flight set aside."""
+
+
+def check(number: int, home: Pose) -> Pose:
+    """The goal of a number: to and fro over other places, turning one way and back.
+
+    A scale that is off looks like a bias as long as it turns one way.
+    """
+    x_m, y_m, _ = push(number + 2, home)
+    return x_m, y_m, home[2] + (SWING_RAD if number % 2 == 0 else -SWING_RAD)
+
+
+MANOEUVRES = {"turn": turn, "push": push, CHECK: check}
 
 
 class GuidedImu:
@@ -68,120 +93,138 @@ class GuidedImu:
         vehicle: Which one.
     """
 
-    kinds: ClassVar = (Imu, StarFix, OverheadFix, *VehicleWatch.kinds)
-
     def __init__(self, rig: Rig, vehicle: str) -> None:
-        self._vehicle = vehicle
+        self._rig, self._vehicle = rig, vehicle
+        sources = rig.tables.fix_sources
+        fixes: list[type[Message]] = [sources[name].payload for name in fused_sources(rig, vehicle)]
+        self._fed: tuple[type[Message], ...] = (Imu, *fixes)
+        self.kinds: tuple[type[Message], ...] = (*self._fed, *GuidedSteps.kinds)
         self._smoother = OfflineSmoother(widened(rig_noise(rig, vehicle)))
         self._node = fusion_node(rig, vehicle, self._smoother)
-        self._sequence = GuidedSequence(STEPS)
-        self._keep_in = rig.table.keep_in()
-        self._watch = VehicleWatch(vehicle)
-        self._advice: Advice | None = None
-        self._began_s = 0.0
-        self._turned_rad = self._travelled_m = 0.0
-        self._pose: Pose | None = None
-        self._refusal = ""
-        self._is_asked = self._is_given = self._is_rest = False
-        self._sent, self._next_s = 0, math.inf
-        self._home: Pose = (0.0, 0.0, 0.0)
+        self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, MANOEUVRES)
+        self._set_aside: list[Received] = []
+        self._checked_s = 0.0
+        self._first_c = self._check_c = math.nan
+        self._rate = LiveCurve("turn rate, deg/s", "line", 0.1)
+        self._force = [LiveCurve(f"force {axis}, 100 mm/s²", "line", 0.1) for axis in "xy"]
+        self._off = [LiveCurve(f"{axis}, {unit}") for axis, _, unit in AXES]
 
     @property
     def outcomes(self) -> dict[str, str]:
         """How each step ended."""
-        return self._sequence.outcomes
+        return self._steps.outcomes
 
     def take(self, message: Message, now_ns: int) -> None:
-        """Take a message of the vehicle."""
-        self._watch.take(message)
-        for _ in self._node.receive(message, now_ns):
-            pass
-        state = self._smoother.state()
-        if isinstance(message, StarFix) and state is not None:
-            pose = (state.x_m, state.y_m, state.heading_rad)
-            if self._pose is not None and self._watch.floats:
-                self._travelled_m += math.hypot(pose[0] - self._pose[0], pose[1] - self._pose[1])
-                self._turned_rad += abs(pose[2] - self._pose[2])
-            self._pose = pose
+        """Take a message of the vehicle; those of the last step are kept apart."""
+        if getattr(message, "vehicle", self._vehicle) != self._vehicle:
+            return
+        self._steps.take(message)
+        if isinstance(message, Imu):
+            self._look(message)
+        if self._steps.name == CHECK:
+            if not isinstance(message, PoseFix) or isinstance(message, self._fed):
+                self._set_aside.append((message, now_ns))
+            if isinstance(message, Imu) and self._steps.floats:
+                self._checked_s += message.window_s
+            return
+        if isinstance(message, PoseFix) and not isinstance(message, self._fed):
+            return
+        for answer in self._node.receive(message, now_ns):
+            if isinstance(answer, FixAccount) and answer.used:
+                for curve, off, (_, factor, _) in zip(self._off, answer.innovation, AXES, strict=True):
+                    curve.add(answer.stamp_ns * 1e-9, factor * off)
 
     def advice(self, now_s: float) -> Advice:
         """Return what to do now."""
-        known = self._known(now_s)
-        if self._refusal:
-            advice = self._sequence.give_up(now_s, known, self._refusal)
-        else:
-            advice = self._sequence.update(now_s, known)
-        if advice.is_new:
-            self._begin_step(now_s, is_rest=advice.step is not None and advice.step.is_rest)
-        waits = "" if advice.step is None or advice.step.is_rest else self._watch.waits()
-        self._advice = replace(advice, note=waits)
-        return self._advice
+        return self._steps.advice(now_s, self._known())
 
-    def _begin_step(self, now_s: float, *, is_rest: bool) -> None:
-        """Forget the step before, but not that it has been given what this one needs as well."""
-        self._is_given = self._is_given and self._is_rest == is_rest
-        self._is_asked, self._is_rest, self._refusal = self._is_given, is_rest, ""
-        self._began_s, self._next_s, self._sent = now_s, math.inf, 0
+    def pictures(self) -> Sequence[Drawing]:
+        """Return the readings, and how far each fix is off what the IMU predicts."""
+        return (
+            Drawing("What the IMU reads", "time, s", "", [c.curve() for c in (self._rate, *self._force)]),
+            Drawing("Fix less what the IMU predicts", "time, s", "mm, deg", [c.curve() for c in self._off]),
+        )
 
     def hindrance(self) -> str:
         """Return why the calibration cannot begin yet; empty if it can."""
-        return self._watch.unknown()
+        return self._steps.hindrance()
 
     def trouble(self) -> str:
         """Return why the calibration ends early: somebody else has taken the vehicle; empty if nobody has."""
-        return self._watch.taken(is_rest=self._is_rest) if self._is_given else self._watch.stopped()
+        return self._steps.trouble()
 
     def answer(self, action: str, reason: str) -> None:
         """Note what became of a request; a refusal, with its reason, ends the step."""
-        if reason:
-            self._refusal = f"{action} was refused: {reason}"
-        elif action in ("land", "fly"):
-            self._is_given = True
+        self._steps.answer(action, reason)
 
     def requests(self, now_s: float) -> Iterator[Wish]:
         """Yield what the step of the last advice wants the vehicle to do, now and then."""
-        step = None if self._advice is None else self._advice.step
-        if step is None or self._refusal:
-            return
-        if not self._is_asked:
-            self._is_asked = step.is_rest or not self._watch.is_on_its_way_down
-            if self._is_asked:
-                yield "land" if step.is_rest else "fly", {}
-            return
-        if step.is_rest or not self._is_given or self._watch.waits():
-            return
-        if self._next_s == math.inf:
-            self._home, self._next_s = self._pose or self._home, now_s + SETTLE_S
-        if now_s < self._next_s:
-            return
-        self._next_s = now_s + GO_TO_EVERY_S
-        x_m, y_m, heading_rad = inside(MANOEUVRES[step.name](self._sent, self._home), self._keep_in)
-        self._sent += 1
-        yield "go_to", {"x_m": x_m, "y_m": y_m, "heading_rad": math.remainder(heading_rad, math.tau)}
+        return self._steps.requests(now_s)
 
     def outcome(self) -> Outcome:
-        """Return every constant with its sigma.
+        """Return every constant with its sigma, tried on the flight that was kept apart.
 
         Raises:
             CalibrationRefusedError: No two fixes agreed.
         """
         quantities = constants(self._smoother)
+        verification, warnings, drawings = self._verified(quantities)
         return Outcome(
             title=f"IMU of {self._vehicle}, guided",
             summary="\n".join(quantity_lines(quantities)),
             quantities=quantities,
             residual={},
-            notes={f"step_{step}": outcome for step, outcome in self._sequence.outcomes.items()},
+            notes={f"step_{step}": outcome for step, outcome in self.outcomes.items()},
+            warnings=warnings,
+            verification=verification,
+            verified_by=f"a flight of {self._checked_s:.0f} s, carried {GAP_S:g} s from fix to fix"
+            if verification
+            else "",
+            drawings=drawings,
         )
 
-    def _known(self, now_s: float) -> dict[str, float]:
-        """Return the quantities of the goals; of a rest, the part without a break that lies in this step."""
-        rest_s = min(self._watch.rest_s, now_s - self._began_s) if self._is_rest else 0.0
-        amounts = {"rest_s": rest_s, "turned_rad": self._turned_rad, "travelled_m": self._travelled_m}
+    def _verified(
+        self, found: Mapping[str, Quantity]
+    ) -> tuple[dict[str, Quantity], tuple[str, ...], tuple[Drawing, ...]]:
+        noise = rig_noise(self._rig, self._vehicle)
+        found = warmed(found, self._check_c - self._first_c)
+        try:
+            after = carried(self._rig, self._vehicle, self._set_aside, held(noise, found))
+            before = carried(self._rig, self._vehicle, self._set_aside, held_before(noise, found))
+        except CalibrationRefusedError as error:
+            return {}, (f"it is not verified: {error}",), ()
+        numbers = {
+            f"{name}{ending}": Quantity(float(rms), math.nan, "rad" if name == "heading" else "m")
+            for ending, each in (("", after), ("_with_the_rigs_constants", before))
+            for (name, _, _), rms in zip(AXES, each.rms, strict=True)
+        }
+        nis = float(after.nis.mean())
+        numbers["nis"] = Quantity(nis, math.sqrt(6.0 / len(after.nis)), "1")
+        warnings = (
+            (f"the flight set aside contradicts it: {nis:.1f} squared sigmas a fix, 3 are expected",)
+            if nis > WORST_NIS
+            else ()
+        )
+        return numbers, warnings, tuple(_drawing(k, before, after) for k in range(3))
+
+    def _look(self, imu: Imu) -> None:
+        """Keep some readings for the picture, and at which temperatures fit and check begin."""
+        if math.isnan(self._first_c):
+            self._first_c = imu.temperature_c
+        if math.isnan(self._check_c) and self._steps.name == CHECK:
+            self._check_c = imu.temperature_c
+        t_s = imu.stamp_ns * 1e-9
+        self._rate.add(t_s, math.degrees(imu.rate_body_rad_s))
+        for curve, force in zip(self._force, imu.force_body_m_s2, strict=True):
+            curve.add(t_s, 10.0 * force)
+
+    def _known(self) -> dict[str, float]:
+        """Return the quantities of the goals."""
+        known = {"checked_s": self._checked_s}
         if self._smoother.state() is None:
-            return amounts
+            return known
         sigma = self._smoother.sigmas().tolist()
-        return amounts | {
+        return known | {
             "gyro_bias_sigma_rad_s": sigma[es.GYRO_BIAS],
             "gyro_scale_sigma": sigma[es.GYRO_SCALE],
             "lever_sigma_m": max(sigma[es.LEVER_X], sigma[es.LEVER_Y]),
@@ -190,10 +233,28 @@ class GuidedImu:
         }
 
 
+def _drawing(axis: int, before: Carried, after: Carried) -> Drawing:
+    name, factor, unit = AXES[axis]
+    rows: tuple[tuple[str, Carried, Mark], ...] = (
+        ("with the rig's constants", before, "refused"),
+        ("with the result", after, "dots"),
+    )
+    curves = []
+    for words, each, mark in rows:
+        t_s, off = each.off[:, 0] - each.off[0, 0], factor * each.off[:, axis + 1]
+        curves.append(Curve(words, t_s.tolist(), off.tolist(), mark))
+    return Drawing(f"Drift in {GAP_S:g} s, flight set aside: {name}", "time, s", f"{name}, {unit}", curves)
+
+
 class ImuWizard:
     """Makes guided calibrations of the IMU."""
 
     summary = "IMU: biases, scales, lever arm and slope by rest, turns and pushes."
+
+    def missing(self, rig: Rig, vehicle: str) -> str:
+        """Nothing: each vehicle has an IMU and fixes."""
+        del rig, vehicle
+        return ""
 
     def begin(self, rig: Rig, vehicle: str) -> GuidedImu:
         """Begin to calibrate a vehicle."""

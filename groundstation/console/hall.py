@@ -1,7 +1,7 @@
 """The screens that look on, and what each is sent; the heart of the server, without HTTP."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from groundstation.console.chart_tap import ChartTap, UnknownFieldError
@@ -55,6 +55,7 @@ class Hall:
         self._source = source
         self._payloads = payloads
         self.screens: list[Screen] = []
+        self.greetings: list[Callable[[], bytes]] = []
         self.now_ns = 0
         self._steps = 0
         self._counts: dict[tuple[str, str], int] = {}
@@ -70,7 +71,14 @@ class Hall:
         self.screens.append(screen)
         hello = {"type": "rig", "rig": self._source.page, "may_command": screen.may_command}
         screen.client.append(json_frame(hello))
+        for greeting in self.greetings:
+            screen.client.append(greeting())
         self._send_events(screen)
+
+    def tell(self, what: str, frame: bytes) -> None:
+        """Send all screens a frame that replaces the one of the same name."""
+        for screen in self.screens:
+            screen.client.show(what, frame)
 
     def leave(self, screen: Screen) -> None:
         """End it."""

@@ -19,6 +19,7 @@ from groundstation.console.limit_watch import LimitWatch
 from groundstation.console.options import Options
 from groundstation.console.rig_page import rig_page
 from groundstation.console.server import Console, make_app
+from groundstation.console.wizards import Wizards
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.names import CONSOLE
 from groundstation.declarations.rig import Rig
@@ -99,6 +100,11 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
     desk = Desk(bus, stop_bus, source.vehicles, rig.tables.actions, Tokens(options.secret))
     ahead = FlownAhead(rig, source.feed, orders)
     console = Console(source, rig.tables, options.access, desk, ahead.fly if ahead.can_fly else None)
+    console.lead(
+        Wizards(
+            rig, orders.rig_text, orders.rig_path.name, source.feed, desk, console.holder, console.hall.tell
+        )
+    )
     access = options.access
     server = uvicorn.Server(
         uvicorn.Config(

@@ -17,6 +17,8 @@ from groundstation.console.desk import Desk, LeaseOffice, NotAllowedError, body_
 from groundstation.console.hall import Hall, Screen
 from groundstation.console.source import Source
 from groundstation.console.wire import json_frame, plain
+from groundstation.console.wizard_api import add_wizard
+from groundstation.console.wizards import Wizards
 from groundstation.declarations.request import ArgumentError
 from groundstation.declarations.tables import Tables
 
@@ -66,9 +68,16 @@ class Console:
         self.desk = desk
         self.preview = preview
         self.hall = Hall(source, tables.payloads)
-        self.office = None if desk is None else LeaseOffice(desk, self._holder)
+        self.office = None if desk is None else LeaseOffice(desk, self.holder)
+        self.wizards: Wizards | None = None
 
-    def _holder(self) -> str:
+    def lead(self, wizards: Wizards) -> None:
+        """Let guided calibrations be led here."""
+        self.wizards = wizards
+        self.hall.greetings.append(wizards.frame)
+
+    def holder(self) -> str:
+        """Who holds control now; empty for nobody."""
         lease = self.hall.look().get("lease", {})
         return str(lease.get("holder", "")) if lease.get("left_s", 0.0) > 0.0 else ""
 
@@ -98,9 +107,12 @@ def make_app(console: Console) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         del app
-        running = asyncio.create_task(console.hall.run())
+        running = [asyncio.create_task(console.hall.run())]
+        if console.wizards is not None:
+            running.append(asyncio.create_task(console.wizards.run()))
         yield
-        running.cancel()
+        for task in running:
+            task.cancel()
 
     app = FastAPI(
         title="groundstation console", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan
@@ -108,6 +120,7 @@ def make_app(console: Console) -> FastAPI:
     _guard(app, console)
     _add_api(app, console)
     _add_lease(app, console)
+    add_wizard(app, console, _token, _refused)
     _add_pages(app, console)
     app.add_api_websocket_route("/ws", _socket(console))
     return app

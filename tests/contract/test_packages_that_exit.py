@@ -4,20 +4,20 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from calibration import wizards
 from drivers.errors import NotFound
 from drivers.laboratory import channels
 from firmware_emulator import device_table
 from groundstation.cli import extensions
 from groundstation.control import controllers
 from groundstation.declarations.errors import UsageError
+from groundstation.launch import guided
 from groundstation.parts import table
 
 LOADERS = {
     "parts": (table, table.installed_tables.__wrapped__, UsageError),
     "controllers": (controllers, controllers.controllers.__wrapped__, controllers.ControllerError),
     "commands": (extensions, lambda: extensions.extension("leaver"), extensions.BrokenCommandError),
-    "wizards": (wizards, lambda: wizards.load_wizard("leaver"), UsageError),
+    "wizards": (guided, lambda: guided.load_wizard("leaver"), UsageError),
     "laboratories": (channels, lambda: channels.load_laboratory("leaver", {}, 0), NotFound),
     "devices": (device_table, device_table.device_kinds.__wrapped__, NotFound),
 }

@@ -105,9 +105,10 @@ def _detector(rig: Rig, vehicle: str) -> Node:
     )
 
 
-def _learner(rig: Rig, vehicle: str) -> Node:
+def identification_config(rig: Rig, vehicle: str) -> IdentificationConfig:
+    """What a rig states beforehand of a vehicle's valves and of the IMU that feels them."""
     type_, imu = rig.type_of(vehicle), rig.of_type(vehicle, ImuOfType).imu
-    known = IdentificationConfig(
+    return IdentificationConfig(
         imu_position_body_m=imu.position_body_m,
         gyro_density_rad_s_rthz=imu.gyro_density_rad_s_rthz,
         acc_density_m_s2_rthz=imu.acc_density_m_s2_rthz,
@@ -118,7 +119,12 @@ def _learner(rig: Rig, vehicle: str) -> Node:
         gyro_lag_s=lag_of_bandwidth(imu.gyro_bandwidth_hz),
         model_sigma_s=EDGES_SIGMA_S,
     )
-    return ValveLearner(vehicle, ValveIdentification(type_.model(), known))
+
+
+def valve_learner(rig: Rig, vehicle: str) -> ValveLearner:
+    """A node that learns a vehicle's valves."""
+    known = identification_config(rig, vehicle)
+    return ValveLearner(vehicle, ValveIdentification(rig.type_of(vehicle).model(), known))
 
 
 def _learns(rig: Rig, vehicle: str) -> bool:
@@ -137,7 +143,7 @@ PART = Part(
     nodes=(
         NodeRow("supervisor", COMMANDS, Weight.URGENT, SupervisorNode, _supervisor),
         NodeRow("fault_detector", FLIGHT, Weight.LIGHT, FaultDetector, _detector),
-        NodeRow("valve_learner", FLIGHT, Weight.LIGHT, ValveLearner, _learner, _learns),
+        NodeRow("valve_learner", FLIGHT, Weight.LIGHT, ValveLearner, valve_learner, _learns),
     ),
     ports=(PortRow("supervisor", MemoryPort, _memory),),
     actions=tuple(ACTIONS.values()),

@@ -3,7 +3,8 @@ from calibration.imu.guided_imu import STEPS
 
 EVERYTHING = {
     "rest_s": 1e3, "gyro_bias_sigma_rad_s": 0.0, "turned_rad": 1e3, "gyro_scale_sigma": 0.0,
-    "lever_sigma_m": 0.0, "travelled_m": 1e3, "slope_sigma_m_s2": 0.0, "acc_scale_sigma": 0.0,
+    "lever_sigma_m": 0.0, "travelled_m": 1e3, "checked_s": 1e3, "slope_sigma_m_s2": 0.0,
+    "acc_scale_sigma": 0.0,
 }  # fmt: skip
 
 

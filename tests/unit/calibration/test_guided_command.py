@@ -1,7 +1,7 @@
 import pytest
 
-from calibration.wizards import load_wizard
 from groundstation.declarations.errors import UsageError
+from groundstation.launch.guided import load_wizard
 
 RIG = "examples/rigs/drawn_fixes.toml"
 
@@ -12,7 +12,8 @@ RIG = "examples/rigs/drawn_fixes.toml"
         (("imu", RIG, "--out", "x.toml"), "--guided"),
         (("imu", RIG, "--guided", "--vehicle", "nobody", "--out", "x.toml"), "no vehicle 'nobody'"),
         (("guided", "imu", RIG, "--vehicle", "nobody", "--out", "x.toml"), "no vehicle 'nobody'"),
-        (("guided", "lens", RIG, "--out", "x.toml"), "no guided calibration 'lens'; installed: imu"),
+        (("guided", "hull", RIG, "--out", "x.toml"), "no guided calibration 'hull'; installed: imu, lens"),
+        (("guided", "mount", RIG, "--out", "x.toml"), "alpha cannot be calibrated so: it has no star camera"),
     ],
 )
 def test_what_is_missing_is_said_before_anything_is_touched(

@@ -1,4 +1,4 @@
-"""Where a vehicle is sent so that its IMU is excited: turns on the spot, and flights to and fro."""
+"""Where a vehicle is sent so that a calibration sees enough: turns on the spot, and flights to and fro."""
 
 from __future__ import annotations
 
@@ -17,6 +17,16 @@ ROUND_TRIP: tuple[Pose, ...] = (
     (0.0, 0.3, -math.pi / 2),
 )
 """From where the vehicle hovers."""
+TOUR: tuple[Pose, ...] = (
+    (0.5, 0.3, 2.0),
+    (-0.5, -0.2, -1.2),
+    (0.1, 0.4, 0.6),
+    (-0.4, 0.1, 2.8),
+    (0.4, -0.4, -2.2),
+    (-0.1, 0.2, 1.1),
+    (0.3, 0.0, -0.5),
+)
+"""Goals from where it hovers: each leg pushes along both axes and turns."""
 _INWARD = 0.01
 """Share of the way to the middle of the table that a goal on the boundary is moved: rounding."""
 
@@ -31,6 +41,12 @@ def turn(number: int, home: Pose) -> Pose:
 def push(number: int, home: Pose) -> Pose:
     """The goal of a number, to and fro along both axes."""
     x_m, y_m, turn_rad = ROUND_TRIP[number % len(ROUND_TRIP)]
+    return home[0] + x_m, home[1] + y_m, home[2] + turn_rad
+
+
+def tour(number: int, home: Pose) -> Pose:
+    """The goal of a number, over the table with turns."""
+    x_m, y_m, turn_rad = TOUR[number % len(TOUR)]
     return home[0] + x_m, home[1] + y_m, home[2] + turn_rad
 
 

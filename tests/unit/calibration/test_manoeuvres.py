@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calibration.imu.manoeuvres import inside, push, turn
+from calibration.manoeuvres import inside, push, turn
 from groundstation.control.keep_in import KeepIn
 
 HOME = (0.4, -0.2, 0.7)

@@ -1,0 +1,1 @@
+"""How a motion-capture system lies to the table, found against poses of another source."""

@@ -1,0 +1,441 @@
+"""A motion-capture system aligned to the table step by step, by flights that another source sees, too."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from calibration.guided_steps import GuidedSteps
+from calibration.live_curve import LiveCurve
+from calibration.manoeuvres import tour
+from calibration.motion_capture.alignment import Alignment, Array, Pairs, align, residuals
+from calibration.outcome import CalibrationRefusedError, Outcome
+from calibration.result import Quantity, quantity_lines
+from groundstation.declarations.fix import PoseFix
+from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step, Wish
+from groundstation.declarations.message import Message
+from groundstation.declarations.rig import Rig
+from groundstation.frames import wrap_angle
+from groundstation.parts.fusion.messages import VehicleState
+from groundstation.parts.motion_capture.capture_frame import CaptureFrame
+from groundstation.parts.motion_capture.messages import CapturedPose
+from groundstation.parts.motion_capture.sections import (
+    CapturedBodySection,
+    MotionCaptureOfRig,
+    MotionCaptureOfVehicle,
+    MotionCaptureSection,
+)
+from groundstation.parts.overhead.messages import OverheadFix
+from groundstation.parts.reference.messages import ReferenceState
+from groundstation.parts.stars.messages import StarFix
+
+CHECK = "check"
+STEPS: tuple[Step, ...] = (
+    Step(
+        "move",
+        "Move the mock-up over the table and turn it, by hand or flying, where both systems see it.",
+        False,
+        (
+            Goal("pairs", 150.0, "poses", is_amount=True),
+            Goal("travelled_m", 2.0, "m", is_amount=True),
+            Goal("turned_rad", 6.0, "rad", is_amount=True),
+            Goal("origin_sigma_m", 1e-3, "m"),
+            Goal("pivot_sigma_m", 1e-3, "m"),
+            Goal("yaw_sigma_rad", 1e-3, "rad"),
+        ),
+        240.0,
+    ),
+    Step(
+        CHECK,
+        "Go on moving and turning it elsewhere: this part is kept apart, and judges the result.",
+        False,
+        (
+            Goal("checked", 100.0, "poses", is_amount=True),
+            Goal("travelled_m", 1.0, "m", is_amount=True),
+            Goal("turned_rad", 3.0, "rad", is_amount=True),
+        ),
+        180.0,
+    ),
+)
+EVERY_S = 7.0
+PAIR_EVERY_NS = 100_000_000
+KEPT_NS, WAITS_NS = 3_000_000_000, 1_500_000_000
+LONGEST_GAP_NS = 100_000_000
+"""Between two poses of the system; nothing is interpolated over more."""
+JUDGED_EVERY_S = 3.0
+REFERENCE_SIGMA = (0.0003, 0.0003)
+"""Of a reference, which states none: m, rad."""
+SOURCES: Mapping[str, type[Message]] = {
+    "stars": StarFix,
+    "overhead": OverheadFix,
+    "reference": ReferenceState,
+}
+"""What the system can be laid beside, the best first."""
+AXES = (("x", 1e3, "mm"), ("y", 1e3, "mm"), ("heading", math.degrees(1.0), "deg"))
+
+
+class GuidedAlignment:
+    """One alignment.
+
+    Args:
+        rig: Of the run.
+        vehicle: Whose rigid body is seen.
+        source: Of `SOURCES`.
+    """
+
+    def __init__(self, rig: Rig, vehicle: str, source: str) -> None:
+        self._vehicle, self._source = vehicle, source
+        self._system, self._body = _sections(rig, vehicle)
+        self._body_name = self._body.body or vehicle
+        self._flat = CaptureFrame(self._system.up, (0.0, 0.0, 0.0), 0.0)
+        self.kinds: tuple[type[Message], ...] = (CapturedPose, SOURCES[source], *GuidedSteps.kinds)
+        manoeuvres = {"move": tour, CHECK: tour}
+        self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S)
+        self._seen: deque[tuple[int, Array]] = deque()
+        self._velocity: deque[tuple[int, Array]] = deque()
+        self._waiting: deque[tuple[int, Array, tuple[float, float], bool]] = deque()
+        self._pair_ns = 0
+        self._fitted: list[Array] = []
+        self._checked: list[Array] = []
+        self._now: Alignment | None = None
+        self._judged_s = -math.inf
+        self._places = [
+            LiveCurve("where the other source sees it", "dots"),
+            LiveCurve("motion capture", "crosses"),
+        ]
+        self._off = [LiveCurve(f"{axis}, {unit}") for axis, _, unit in AXES]
+
+    @property
+    def outcomes(self) -> dict[str, str]:
+        """How each step ended."""
+        return self._steps.outcomes
+
+    def take(self, message: Message, now_ns: int) -> None:
+        """Take a message of the vehicle or of the system."""
+        del now_ns
+        match message:
+            case CapturedPose():
+                self._take_seen(message)
+            case VehicleState() if message.vehicle == self._vehicle:
+                velocity = np.array([*message.velocity_table_m_s, message.rate_rad_s])
+                _keep(self._velocity, message.stamp_ns, velocity)
+            case ReferenceState() if message.vehicle == self._vehicle:
+                pose = np.array([*message.position_table_m, message.heading_rad])
+                self._take_pose(message.stamp_ns, pose, REFERENCE_SIGMA)
+            case PoseFix(fix=True) if message.vehicle == self._vehicle:
+                pose = np.array([message.x_m, message.y_m, message.heading_rad])
+                xy_m2 = 0.5 * (message.covariance[0] + message.covariance[4])
+                self._take_pose(message.stamp_ns, pose, (math.sqrt(xy_m2), math.sqrt(message.covariance[8])))
+        if message.vehicle == self._vehicle:
+            self._steps.take(message)
+
+    def advice(self, now_s: float) -> Advice:
+        """Return what to do now."""
+        if now_s - self._judged_s >= JUDGED_EVERY_S and self._steps.name != CHECK:
+            self._judged_s = now_s
+            self._judge()
+        return self._steps.advice(now_s, self._known())
+
+    def pictures(self) -> Sequence[Drawing]:
+        """Return where both see it, and how far they are apart with the best alignment by now."""
+        return (
+            Drawing("Where it was seen", "x, m", "y, m", [c.curve() for c in self._places], is_to_scale=True),
+            Drawing(
+                "Motion capture less the other source, aligned as far as known",
+                "time, s",
+                "mm, deg",
+                [c.curve() for c in self._off],
+            ),
+        )
+
+    def hindrance(self) -> str:
+        """Return why it cannot begin yet; empty if it can."""
+        unknown = self._steps.hindrance()
+        if unknown:
+            return unknown
+        if not self._seen:
+            return f"motion capture does not report the rigid body {self._body_name!r}."
+        if not self._waiting and not self._pair_ns:
+            return f"no pose of {self._vehicle} is received from the other source ({self._source})."
+        return ""
+
+    def trouble(self) -> str:
+        """Return why it ends early; empty while it goes on."""
+        return self._steps.trouble()
+
+    def answer(self, action: str, reason: str) -> None:
+        """Note what became of a request."""
+        self._steps.answer(action, reason)
+
+    def requests(self, now_s: float) -> Iterator[Wish]:
+        """Yield what the step wants the vehicle to do."""
+        return self._steps.requests(now_s)
+
+    def outcome(self) -> Outcome:
+        """Return the rig's keys of the system and of the rigid body, tried on what was set aside.
+
+        Raises:
+            CalibrationRefusedError: Too little was seen by both.
+        """
+        fitted = _pairs(self._fitted)
+        found = align(fitted)
+        quantities = self._quantities(found)
+        verification, warnings, drawings = self._verified(found.value)
+        left = np.sqrt((residuals(found.value, fitted) ** 2).mean(axis=0))
+        return Outcome(
+            title=f"Motion capture beside {self._source}, {self._vehicle}",
+            summary="\n".join([*quantity_lines(quantities), *self._lines(found.value)]),
+            quantities=quantities,
+            residual=_rms_quantities(left),
+            notes={
+                "source": self._source,
+                "poses": len(fitted),
+                "chi_square_ratio": found.chi_square_ratio,
+                "rig": self._lines(found.value),
+                **{f"step_{step}": outcome for step, outcome in self.outcomes.items()},
+            },
+            warnings=warnings,
+            verification=verification,
+            verified_by=f"{len(self._checked)} poses set aside, beside {self._source}"
+            if verification
+            else "",
+            drawings=drawings,
+        )
+
+    def _take_seen(self, message: CapturedPose) -> None:
+        if message.body != self._body_name or not message.is_tracked:
+            return
+        try:
+            pose = self._flat.pose(
+                message.position_capture_m, message.quaternion_xyzw, (0.0, 0.0), 0.0, self._system.up
+            )
+        except ValueError:
+            return  # a quaternion that is none is no pose
+        exposure_ns = message.stamp_ns - round(self._system.delay_s * 1e9)
+        _keep(self._seen, exposure_ns, np.array([pose.x_m, pose.y_m, pose.heading_rad]))
+        self._match()
+
+    def _take_pose(self, stamp_ns: int, pose: Array, sigma: tuple[float, float]) -> None:
+        """A pose of the other source waits until the system's poses around it are here."""
+        newest_ns = self._waiting[-1][0] if self._waiting else self._pair_ns
+        if stamp_ns - newest_ns >= PAIR_EVERY_NS:
+            self._waiting.append((stamp_ns, pose, sigma, self._steps.name == CHECK))
+            self._match()
+
+    def _match(self) -> None:
+        while self._waiting and self._seen:
+            stamp_ns, pose, (xy_m, heading_rad), is_check = self._waiting[0]
+            if self._seen[-1][0] < stamp_ns and self._seen[-1][0] - stamp_ns > -WAITS_NS:
+                return
+            self._waiting.popleft()
+            seen, velocity = _at(self._seen, stamp_ns), _at(self._velocity, stamp_ns)
+            if seen is None:
+                continue
+            self._pair_ns = stamp_ns
+            row = np.array(
+                [
+                    *seen,
+                    *pose,
+                    *(np.zeros(3) if velocity is None else velocity),
+                    math.hypot(xy_m, self._system.sigma_xy_m),
+                    math.hypot(heading_rad, self._system.sigma_heading_rad),
+                ]
+            )
+            (self._checked if is_check else self._fitted).append(row)
+            self._draw(row, stamp_ns)
+
+    def _draw(self, row: Array, stamp_ns: int) -> None:
+        value = self._value() if self._now is None else self._now.value
+        one = _pairs([row])
+        off = residuals(value, one)[0]
+        self._places[0].add(float(row[3]), float(row[4]))
+        self._places[1].add(float(row[3] + off[0]), float(row[4] + off[1]))
+        for curve, each, (_, factor, _) in zip(self._off, off, AXES, strict=True):
+            curve.add(stamp_ns * 1e-9, factor * float(each))
+
+    def _judge(self) -> None:
+        try:
+            self._now = align(_pairs(self._fitted))
+        except CalibrationRefusedError:
+            self._now = None
+
+    def _known(self) -> dict[str, float]:
+        known = {"pairs": float(len(self._fitted)), "checked": float(len(self._checked))}
+        if self._now is None:
+            return known
+        sigma = self._now.sigma.tolist()
+        return known | {
+            "origin_sigma_m": max(sigma[0], sigma[1]),
+            "yaw_sigma_rad": sigma[2],
+            "pivot_sigma_m": max(sigma[3], sigma[4]),
+        }
+
+    def _value(self) -> Array:
+        """As the rig has it."""
+        x_m, y_m, _ = self._system.origin_table_m
+        return np.array(
+            [
+                x_m,
+                y_m,
+                math.radians(self._system.yaw_deg),
+                *self._body.pivot_body_m,
+                math.radians(self._body.pivot_yaw_deg),
+                0.0,
+            ]
+        )
+
+    def _quantities(self, found: Alignment) -> dict[str, Quantity]:
+        value, sigma = found.value.tolist(), found.sigma.tolist()
+        turn = math.degrees(1.0)
+        return {
+            "origin_table_x": Quantity(value[0], sigma[0], "m"),
+            "origin_table_y": Quantity(value[1], sigma[1], "m"),
+            "yaw": Quantity(turn * wrap_angle(value[2]), turn * sigma[2], "deg"),
+            "pivot_body_x": Quantity(value[3], sigma[3], "m"),
+            "pivot_body_y": Quantity(value[4], sigma[4], "m"),
+            "pivot_yaw": Quantity(turn * wrap_angle(value[5]), turn * sigma[5], "deg"),
+            "delay": Quantity(self._system.delay_s + value[6], sigma[6], "s"),
+        }
+
+    def _lines(self, value: Array) -> list[str]:
+        """What belongs into the rig file."""
+        z_m, turn = self._system.origin_table_m[2], math.degrees(1.0)
+        return [
+            f"[motion_capture] origin_table_m = [{value[0]:.5f}, {value[1]:.5f}, {z_m:g}]",
+            f"[motion_capture] yaw_deg = {turn * wrap_angle(value[2]):.4f}",
+            f"[motion_capture] delay_s = {max(0.0, self._system.delay_s + value[6]):.4f}",
+            f"[vehicles.{self._vehicle}] motion_capture.pivot_body_m = [{value[3]:.5f}, {value[4]:.5f}]",
+            f"[vehicles.{self._vehicle}] motion_capture.pivot_yaw_deg = {turn * wrap_angle(value[5]):.4f}",
+        ]
+
+    def _verified(self, value: Array) -> tuple[dict[str, Quantity], tuple[str, ...], tuple[Drawing, ...]]:
+        if not self._checked:
+            return {}, ("it is not verified: nothing was seen by both after the fit",), ()
+        pairs = _pairs(self._checked)
+        after, before = residuals(value, pairs), residuals(self._value(), pairs)
+        numbers = _rms_quantities(np.sqrt((after**2).mean(axis=0)))
+        numbers |= {
+            f"{name}_as_the_rig_has_it": number
+            for name, number in _rms_quantities(np.sqrt((before**2).mean(axis=0))).items()
+        }
+        ratio = float(((after / pairs.sigma[:, [0, 0, 1]]) ** 2).mean())
+        numbers["chi_square_ratio"] = Quantity(ratio, math.sqrt(2.0 / after.size), "1")
+        warnings = (
+            (f"the poses set aside contradict it: {ratio:.1f} squared sigmas each, 1 is expected",)
+            if ratio > 4.0
+            else ()
+        )
+        return (
+            numbers,
+            warnings,
+            (_places_drawing(pairs, before, after), _heading_drawing(pairs, before, after)),
+        )
+
+
+def _sections(rig: Rig, vehicle: str) -> tuple[MotionCaptureSection, CapturedBodySection]:
+    system = rig.section(MotionCaptureOfRig).motion_capture
+    body = rig.vehicle(vehicle, MotionCaptureOfVehicle).motion_capture
+    assert system is not None
+    assert body is not None
+    return system, body
+
+
+def _keep(kept: deque[tuple[int, Array]], stamp_ns: int, row: Array) -> None:
+    if kept and stamp_ns <= kept[-1][0]:
+        return
+    kept.append((stamp_ns, row))
+    while stamp_ns - kept[0][0] > KEPT_NS:
+        kept.popleft()
+
+
+def _at(kept: deque[tuple[int, Array]], stamp_ns: int) -> Array | None:
+    """Between the two rows around a moment; None where they are too far apart. The last is a turn."""
+    before = None
+    for row in reversed(kept):
+        if row[0] <= stamp_ns:
+            before = row
+            break
+        after = row
+    if before is None or kept[-1][0] < stamp_ns:
+        return None
+    if before[0] == stamp_ns:
+        return before[1]
+    if after[0] - before[0] > LONGEST_GAP_NS:
+        return None
+    share = (stamp_ns - before[0]) / (after[0] - before[0])
+    step = after[1] - before[1]
+    step[2] = wrap_angle(step[2])
+    return np.asarray(before[1] + share * step)
+
+
+def _pairs(rows: Sequence[Array]) -> Pairs:
+    table = np.array(rows).reshape(-1, 11)
+    return Pairs(table[:, :3], table[:, 3:6], table[:, 6:9], table[:, 9:])
+
+
+def _rms_quantities(rms: Array) -> dict[str, Quantity]:
+    return {
+        name: Quantity(float(each), math.nan, "rad" if name == "heading" else "m")
+        for (name, _, _), each in zip(AXES, rms, strict=True)
+    }
+
+
+def _places_drawing(pairs: Pairs, before: Array, after: Array) -> Drawing:
+    rows: tuple[tuple[str, Array, Mark], ...] = (
+        ("as the rig has it", before, "refused"),
+        ("aligned", after, "dots"),
+    )
+    curves = [
+        Curve(name, (1e3 * off[:, 0]).tolist(), (1e3 * off[:, 1]).tolist(), mark) for name, off, mark in rows
+    ]
+    del pairs
+    return Drawing("Poses set aside: how far off the place", "x, mm", "y, mm", curves, is_to_scale=True)
+
+
+def _heading_drawing(pairs: Pairs, before: Array, after: Array) -> Drawing:
+    heading = np.degrees(pairs.pose[:, 2]).tolist()
+    rows: tuple[tuple[str, Array, Mark], ...] = (
+        ("as the rig has it", before, "refused"),
+        ("aligned", after, "dots"),
+    )
+    curves = [Curve(name, heading, np.degrees(off[:, 2]).tolist(), mark) for name, off, mark in rows]
+    return Drawing("Poses set aside: how far off the heading", "heading, deg", "off, deg", curves)
+
+
+class AlignmentWizard:
+    """Makes guided alignments of motion capture."""
+
+    summary = (
+        "Motion capture: origin and yaw of its frame, pivot of the rigid body, delay, beside another source."
+    )
+
+    def missing(self, rig: Rig, vehicle: str) -> str:
+        """Return what the rig lacks."""
+        system = rig.section(MotionCaptureOfRig).motion_capture
+        if system is None or rig.vehicle(vehicle, MotionCaptureOfVehicle).motion_capture is None:
+            return "it has no motion capture"
+        if not _sources(rig, vehicle):
+            return "motion capture has no other source beside it: stars, the overhead camera, or a reference"
+        return ""
+
+    def begin(self, rig: Rig, vehicle: str) -> GuidedAlignment:
+        """Begin to align the system by a vehicle."""
+        return GuidedAlignment(rig, vehicle, _sources(rig, vehicle)[0])
+
+
+def _sources(rig: Rig, vehicle: str) -> list[str]:
+    """What else sees the vehicle."""
+    found = [
+        name
+        for name, source in rig.tables.fix_sources.items()
+        if name in SOURCES and source.condition(rig, vehicle)
+    ]
+    if getattr(rig.vehicles[vehicle], "reference", None) is not None:
+        found.append("reference")
+    return sorted(found, key=list(SOURCES).index)
+
+
+WIZARD = AlignmentWizard()
