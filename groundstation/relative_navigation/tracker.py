@@ -36,6 +36,9 @@ Floats = NDArray[np.float64]
 
 CONTRADICTION = 45.0
 """Squared distance in sigmas of a pose from its prediction at which the frame is solved without it."""
+DECIDED_RAD = 0.09
+"""A prediction with a turn sigma below this chooses between the two poses of coplanar points."""
+FIRST_FRAMES = 4
 UNEXPLAINED = 20.0
 """Log of the likelihood that a hypothesis loses where another explains a frame and it does not."""
 FRAMES_TO_SEARCH = 1
@@ -136,7 +139,7 @@ class MotionTracker:
         self, centres: Centres, matches: Matches, start: Pose, prior: PosePrior
     ) -> tuple[PoseFit, Matches] | None:
         settings = self._settings
-        if not enough(matches, settings.target):
+        if not (enough(matches, settings.target) or _is_decided(matches, prior)):
             return None
         sight = sight_of(centres, matches)
         points = settings.target.points_from_mass_m
@@ -257,6 +260,9 @@ class MotionTracker:
         motion = self._hypotheses[0].motion
         estimate = motion.estimate
         self._watch(frame, fit)
+        if self._is_aliased or self._has_lost_its_way(estimate.pose, fit):
+            motion = self._anew(frame, fit)
+            estimate = motion.estimate
         status, reason = Status.SOLVED, Reason.NONE
         pose, covariance = estimate.pose, estimate.covariance[:6, :6]
         velocity, rate = estimate.velocity_m_s, estimate.rate_rad_s
@@ -288,8 +294,27 @@ class MotionTracker:
             np.stack((matches.point, matches.centre), axis=1),
         )
 
+    def _has_lost_its_way(self, pose: Pose, fit: PoseFit) -> bool:
+        """Whether the first frames turned so far that the filter's series of small turns did not hold."""
+        if not 1 < self._hypotheses[0].motion.frames <= FIRST_FRAMES or not math.isfinite(
+            fit.covariance[0, 0]
+        ):
+            return False
+        off = pose.minus(fit.pose)
+        return float(off @ np.linalg.solve(fit.covariance, off)) > CONTRADICTION
+
+    def _anew(self, frame: Frame, fit: PoseFit) -> MotionFilter:
+        """Begin the likeliest hypothesis again with the frame's own pose."""
+        craft, inertia = self._settings.craft, self._settings.target.inertia_kg_m2
+        self._hypotheses[0].motion = MotionFilter(craft, inertia, frame.t_s, fit.pose, fit.covariance)
+        return self._hypotheses[0].motion
+
     def _watch(self, frame: Frame, fit: PoseFit) -> None:
         """Look at the first frames, whether the target turns too fast for them."""
+        if len(self._hypotheses) > 1:  # the likeliest may change from frame to frame
+            self._alias.forget()
+            self._is_aliased = False
+            return
         if self._alias.is_decided and not self._is_aliased:
             return
         inertial_from_camera = self._settings.craft.turned_by(0.0, frame.t_s).T
@@ -307,3 +332,11 @@ class MotionTracker:
         by = np.eye(6)
         by[:3, 3:] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]  # -(turn x arm) = arm x turn
         return pose.shifted(-offset), by @ covariance @ by.T
+
+
+def _is_decided(matches: Matches, prior: PosePrior) -> bool:
+    """Whether four coplanar points are enough because motion tells their two poses apart."""
+    if len(matches) < 4:
+        return False
+    turn = np.linalg.inv(prior.information)[3:, 3:]
+    return bool(np.trace(turn) < DECIDED_RAD**2)
