@@ -36,11 +36,13 @@ class Background:
         level: Of the background.
         sigma: Of the noise.
         brightest: Of the picture.
+        saturated: Share of it that is over-exposed.
     """
 
     level: float
     sigma: float
     brightest: int
+    saturated: float = 0.0
 
 
 def background_of(picture: Picture) -> Background:
@@ -57,7 +59,8 @@ def background_of(picture: Picture) -> Background:
     mean = float(weight @ steps) / count
     spread = float(weight @ (steps - mean) ** 2) / count
     brightest = int(cv2.minMaxLoc(picture)[1])
-    return Background(mean, max(LEAST_NOISE, min(1.5 * sigma, spread**0.5)), brightest)
+    saturated = float(counts[SATURATED:].sum()) / float(total[-1])
+    return Background(mean, max(LEAST_NOISE, min(1.5 * sigma, spread**0.5)), brightest, saturated)
 
 
 def _quantile(counts: NDArray[np.int64], total: NDArray[np.int64], share: float) -> float:

@@ -131,11 +131,13 @@ def look_for_spots(picture: Picture, settings: SpotSettings, height: float | Non
     grey = picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
     method = METHODS[settings.method]
     background = background_of(grey)
+    if background.saturated > FLOODED_SHARE:
+        return nothing(Trouble.GLARE, background.saturated)
     if background.brightest < background.level + SIGMAS * background.sigma:
         return nothing(Trouble.DARK if background.level < 40.0 else Trouble.NO_SPOTS)
     glare = glare_of(grey) if background.brightest >= SATURATED else None
     share = 0.0 if glare is None else cv2.countNonZero(glare) / grey.size
-    if share > FLOODED_SHARE or background.level >= SATURATED:
+    if share > FLOODED_SHARE:
         return nothing(Trouble.GLARE, share)
     if settings.level is not None or method.is_published:
         ratio = PUBLISHED_LEVEL if settings.level is None else settings.level

@@ -93,7 +93,7 @@ def test_pictures_without_a_target_say_what_is_wrong(rng):
     sun = pictures.paint([(320, 240)], [150.0], rng, level=400.0)
     assert look_for_spots(sun, SpotSettings()).trouble is Trouble.GLARE
     texture = (255 * (rng.random((480, 640)) > 0.8)).astype(np.uint8)
-    assert look_for_spots(texture, SpotSettings()).trouble in (Trouble.TOO_MANY, Trouble.NO_SPOTS)
+    assert look_for_spots(texture, SpotSettings()).trouble is not Trouble.NONE
 
 
 def test_a_glare_is_masked_and_the_rest_is_seen(rng):
