@@ -43,6 +43,9 @@ COMMANDS: dict[str, Row] = {
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "reproduce": Command("groundstation.cli.reproduce:app", "Run published experiments again."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
+    "relative": Command(
+        "groundstation.cli.relative:app", "Where another craft is and how it turns, by camera."
+    ),
 }
 ALIASES = {
     ("star-tracker", "survey"): ("calibrate", "survey"),
