@@ -42,7 +42,7 @@ def doctor(
     for finding in examine(Machine.of_process(root), loaded, _looking):
         findings.append(finding)
         if not as_json:
-            console.print(_line(finding))
+            console.print(_line(finding), soft_wrap=True)  # what to do is copied as one line
     if as_json:
         print(json.dumps([_as_dict(finding) for finding in findings], indent=1))
     if any(finding.verdict is Verdict.BAD for finding in findings):

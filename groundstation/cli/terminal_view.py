@@ -48,7 +48,8 @@ _LEAST_EVENTS, _MOST_EVENTS = 2, EVENTS_KEPT
 _LEAST_ROWS = 2  # of a vehicle: its mode and its faults
 _AROUND_ROWS = 4  # heading and rule, and the empty lines around
 _AROUND_EVENTS = 2  # the frame
-_WIDEST_LABEL = 24
+_WIDEST_LABEL, _NARROW_LABEL, _NARROW = 24, 18, 100
+"""Characters of a row's name; on a terminal narrower than the last, numbers have the room."""
 _BETWEEN = 2  # spaces around a column
 _SPACES = re.compile(" {2,}")
 _EMPTY = ("", NOTHING.text)
@@ -166,7 +167,8 @@ class TerminalView:
             labels: Of the rows.
             cells: Of each vehicle, in the order of the labels.
         """
-        label_width = min(max(map(len, labels), default=0), _WIDEST_LABEL)
+        widest = _NARROW_LABEL if self._console.width < _NARROW else _WIDEST_LABEL
+        label_width = min(max(map(len, labels), default=0), widest)
         names = list(cells)
         for first in range(0, len(names), _MOST_COLUMNS):
             shown = names[first : first + _MOST_COLUMNS]

@@ -103,7 +103,7 @@ def clocks(machine: Machine, ask: Callable[[], KernelClock | None] = kernel_cloc
     elif not found.is_synchronised:
         yield warn(
             "UTC",
-            "nothing keeps it: recordings of several hosts cannot be laid side by side; flying needs it not",
+            "nothing keeps it: recordings of several hosts cannot be laid side by side; a flight needs none",
             advice,
         )
     elif found.max_error_s > FAR_OFF_S:
