@@ -116,7 +116,11 @@ def _weighed(value: Array, pairs: Pairs) -> Array:
 
 def _fit(pairs: Pairs, value: Array) -> tuple[Array, Array]:
     """The best value, and the Jacobian there; a pair that is far off pulls no harder than one that is off."""
-    found = least_squares(lambda x: _weighed(x, pairs), value, x_scale="jac", loss="huber", f_scale=OUTLIER)
+
+    def misfit(at: Array) -> Array:
+        return _weighed(at, pairs)
+
+    found = least_squares(misfit, value, x_scale="jac", loss="huber", f_scale=OUTLIER)
     return found.x, np.asarray(found.jac)
 
 
