@@ -117,10 +117,10 @@ def _weighed(value: Array, pairs: Pairs) -> Array:
 def _fit(pairs: Pairs, value: Array) -> tuple[Array, Array]:
     """The best value, and the Jacobian there; a pair that is far off pulls no harder than one that is off."""
 
-    def left(trial: Array) -> Array:
-        return _weighed(trial, pairs)
+    def misfit(at: Array) -> Array:
+        return _weighed(at, pairs)
 
-    found = least_squares(left, value, x_scale="jac", loss="huber", f_scale=OUTLIER)
+    found = least_squares(misfit, value, x_scale="jac", loss="huber", f_scale=OUTLIER)
     return found.x, np.asarray(found.jac)
 
 

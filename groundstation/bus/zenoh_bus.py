@@ -14,9 +14,9 @@ Latched topics are repeated by their publisher with the same sequence number.
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Self, TypeVar
 
 import zenoh
@@ -61,13 +61,23 @@ def _config(mode: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...]
     return config
 
 
-def open_hub(endpoint: str) -> zenoh.Session:
+def open_hub(
+    endpoint: str, also_at: tuple[str, ...] = (), settings: Mapping[str, Any] = MappingProxyType({})
+) -> zenoh.Session:
     """Open the hub that all processes connect to, e.g. at ``tcp/127.0.0.1:7447``.
+
+    Args:
+        endpoint: Where this host's processes connect.
+        also_at: Where others do.
+        settings: Zenoh's, by their keys: what others must show, and what they may do.
 
     Raises:
         HubError: The endpoint is taken, or there is no such network.
     """
-    return _open("opened", endpoint, _config("router", listen=(endpoint,)))
+    config = _config("router", listen=(endpoint, *also_at))
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return _open("opened", " and ".join((endpoint, *also_at)), config)
 
 
 def _open(what: str, endpoint: str, config: zenoh.Config) -> zenoh.Session:
@@ -155,15 +165,26 @@ class ZenohBus:
         endpoint: Of the hub.
         is_hub: This process is the hub; what it receives itself then passes through a thread of its own,
             since an interpreter that is busy must not keep the hub from passing on.
+        also_at: Of a hub: where programs of other hosts connect.
+        settings: Of a hub: Zenoh's, by their keys.
 
     Raises:
         HubError: The hub is not there; or the endpoint is taken.
     """
 
-    def __init__(self, endpoint: str, *, is_hub: bool = False) -> None:
+    def __init__(
+        self,
+        endpoint: str,
+        *,
+        is_hub: bool = False,
+        also_at: tuple[str, ...] = (),
+        settings: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         self._is_hub = is_hub
         client = _config("client", connect=(endpoint,))
-        self._session = open_hub(endpoint) if is_hub else _open("reached", endpoint, client)
+        self._session = (
+            open_hub(endpoint, also_at, settings) if is_hub else _open("reached", endpoint, client)
+        )
         self._publishers: list[TopicPublisher] = []
         self._at_once: dict[tuple[str, str], TopicPublisher] = {}
         self._record: zenoh.Publisher | None = None

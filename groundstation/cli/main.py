@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from groundstation.cli.command import Command, Group
+from groundstation.cli.completion import typed
 from groundstation.cli.extensions import BrokenCommandError, Row, extension, extensions
 from groundstation.cli.plain_words import speak_any_locale
 
@@ -25,6 +26,8 @@ COMMANDS: dict[str, Row] = {
     "console": Command("groundstation.cli.console:app", "Look at a recording in the web console."),
     "recording": Command("groundstation.cli.recording:app", "Look into recordings, recover a torn one."),
     "report": Command("groundstation.cli.report:app", "Draw the figures of a recording."),
+    "status": Command("groundstation.cli.status:app", "Show every running rig on one screen."),
+    "watch": Command("groundstation.cli.watch:app", "Show what a running rig publishes on a topic."),
     "request": Command(
         "groundstation.cli.request:app", "Ask something of a running vehicle, or stop all: arm, stop, go_to."
     ),
@@ -32,10 +35,17 @@ COMMANDS: dict[str, Row] = {
     "parts": Command("groundstation.cli.parts:app", "Show the whole system: topics, nodes, processes."),
     "faults": Command("groundstation.cli.faults:app", "Show modes, what moves them, and every fault."),
     "demo": Command("groundstation.cli.demo:app", "Make small data sets of every kind to try commands on."),
+    "doctor": Command("groundstation.cli.doctor:app", "Check this machine before a flight day."),
+    "certificates": Command(
+        "groundstation.cli.certificates:app", "Make certificates for the console and for other hosts."
+    ),
     "devices": Command("groundstation.cli.devices:app", "Ask every serial port who is there."),
     "star-tracker": Command("groundstation.cli.star_tracker:app", "Star fixes from frames in a folder."),
     "reproduce": Command("groundstation.cli.reproduce:app", "Run published experiments again."),
     "fusion": Command("groundstation.cli.fusion:app", "State estimates from IMU and star fixes in files."),
+    "relative": Command(
+        "groundstation.cli.relative:app", "Where another craft is and how it turns, by camera."
+    ),
 }
 ALIASES = {
     ("star-tracker", "survey"): ("calibrate", "survey"),
@@ -68,7 +78,7 @@ def build(words: list[str]) -> typer.Typer:
     """
     import typer  # here, so that Ctrl-C is understood before anything heavy is loaded
 
-    app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+    app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
     @app.callback()
     def root() -> None:
@@ -156,7 +166,7 @@ def call(words: list[str]) -> int:
         os.environ[DEBUG] = "1"  # for the processes of a run, too
     words = spelled(words)
     try:
-        app = build(words)
+        app = build(spelled(typed(os.environ) or words))
         check_numbers(app)
         app(words, prog_name="groundstation")
     except SystemExit as done:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
-from groundstation.declarations.view import Cell, Level
+from groundstation.declarations.view import NOTHING, Cell, Level
 from groundstation.watch.ledger import STAGES
 from groundstation.watch.monitor import EVENTS_KEPT
 
@@ -47,7 +48,11 @@ _LEAST_EVENTS, _MOST_EVENTS = 2, EVENTS_KEPT
 _LEAST_ROWS = 2  # of a vehicle: its mode and its faults
 _AROUND_ROWS = 4  # heading and rule, and the empty lines around
 _AROUND_EVENTS = 2  # the frame
-_WIDEST_LABEL = 24
+_WIDEST_LABEL, _NARROW_LABEL, _NARROW = 24, 18, 100
+"""Characters of a row's name; on a terminal narrower than the last, numbers have the room."""
+_BETWEEN = 2  # spaces around a column
+_SPACES = re.compile(" {2,}")
+_EMPTY = ("", NOTHING.text)
 
 
 class TerminalView:
@@ -128,11 +133,14 @@ class TerminalView:
             Text(f"{minutes}:{seconds:02d}", style=_DIM),
         )
         lower = self._lower()
-        blocks = math.ceil(len(run.monitor.vehicles) / _MOST_COLUMNS)
-        every = len(next(iter(run.monitor.vehicles.values())).labels())
+        now_ns = time.monotonic_ns()
+        cells = {name: vehicle.rows(now_ns) for name, vehicle in run.monitor.vehicles.items()}
+        labels = next(iter(run.monitor.vehicles.values())).labels()
+        blocks = math.ceil(len(cells) / _MOST_COLUMNS)
         room = self._console.height - 2 - _AROUND_EVENTS  # beside title and keys
-        rows = (room - _LEAST_EVENTS) // blocks - _AROUND_ROWS
-        rows = max(min(rows, every), _LEAST_ROWS)
+        most = max((room - _LEAST_EVENTS) // blocks - _AROUND_ROWS, _LEAST_ROWS)
+        shown_rows = rows_worth_showing(list(cells.values()), most)
+        rows = len(shown_rows)
         room -= blocks * (rows + _AROUND_ROWS)
         has_lower = room - self._lower_lines >= _LEAST_EVENTS
         shown = room - self._lower_lines if has_lower else room
@@ -143,27 +151,35 @@ class TerminalView:
                     overflow="ellipsis")  # fmt: skip
         return Group(
             title,
-            *self._vehicles(rows),
+            *self._vehicles(
+                [labels[row] for row in shown_rows],
+                {name: [column[row] for row in shown_rows] for name, column in cells.items()},
+            ),
             *([lower] if has_lower else []),
             Panel(events, title="events", title_align="left", border_style=_DIM, padding=(0, 1)),
             keys,
         )
 
-    def _vehicles(self, most: int) -> Iterator[Table]:
-        """Tables of vehicles beside each other, the first rows of each."""
-        now_ns = time.monotonic_ns()
-        every = list(self._run.monitor.vehicles.items())
-        for first in range(0, len(every), _MOST_COLUMNS):
-            shown = every[first : first + _MOST_COLUMNS]
+    def _vehicles(self, labels: list[str], cells: dict[str, list[Cell]]) -> Iterator[Table]:
+        """Tables of vehicles beside each other.
+
+        Args:
+            labels: Of the rows.
+            cells: Of each vehicle, in the order of the labels.
+        """
+        widest = _NARROW_LABEL if self._console.width < _NARROW else _WIDEST_LABEL
+        label_width = min(max(map(len, labels), default=0), widest)
+        names = list(cells)
+        for first in range(0, len(names), _MOST_COLUMNS):
+            shown = names[first : first + _MOST_COLUMNS]
             table = Table(box=box.SIMPLE_HEAD, expand=True, padding=(0, 1), pad_edge=False)
-            labels = shown[0][1].labels()[:most]
-            width = min(max(map(len, labels), default=0), _WIDEST_LABEL)
-            table.add_column("", style=_DIM, no_wrap=True, width=width)
-            for name, _ in shown:
+            table.add_column("", style=_DIM, no_wrap=True, width=label_width)
+            for name in shown:
                 table.add_column(Text(name, style="bold"), no_wrap=True, ratio=1)
-            columns = [vehicle.rows(now_ns)[:most] for _, vehicle in shown]
-            for label, *cells in zip(labels, *columns, strict=True):
-                table.add_row(label, *map(text_of, cells))
+            room = (self._console.width - label_width) // len(shown) - _BETWEEN
+            columns = [[text_of(cell, room) for cell in cells[name]] for name in shown]
+            for label, *row in zip(labels, *columns, strict=True):
+                table.add_row(label, *row)
             yield table
 
     def _lower(self) -> Segments:
@@ -219,9 +235,37 @@ class TerminalView:
         return table
 
 
-def text_of(cell: Cell) -> Text:
-    """A cell in the colours of its levels; what does not fit is cut off."""
+def rows_worth_showing(columns: Sequence[Sequence[Cell]], most: int) -> list[int]:
+    """Which rows are shown: all where they find room, else those in which something stands come first.
+
+    Mode and faults always are; a row that nothing is published for gives way to one further down.
+
+    Args:
+        columns: Cells of each vehicle.
+        most: Rows that there is room for.
+    """
+    every = range(len(columns[0]))
+    if len(every) <= most:
+        return list(every)
+    filled = [
+        row
+        for row in every
+        if row < _LEAST_ROWS or any(column[row].text.strip() not in _EMPTY for column in columns)
+    ]
+    return filled[:most]
+
+
+def text_of(cell: Cell, room: int | None = None) -> Text:
+    """A cell in the colours of its levels; what does not fit is cut off.
+
+    Args:
+        cell: The cell.
+        room: Characters that there are: where they are too few, columns of numbers move together first.
+    """
     pieces = [(piece, _STYLES[level]) for piece, level in cell.pieces]
+    if room is not None and len(cell.text) > room:
+        pieces = [(_SPACES.sub(" ", piece), style) for piece, style in pieces]
+        pieces[0] = (pieces[0][0].lstrip(), pieces[0][1])
     return Text.assemble(*pieces, no_wrap=True, overflow="ellipsis")
 
 

@@ -7,9 +7,12 @@ PATTERN = "[a-z][a-z0-9_]*"
 LOOKS = "small letters, digits and underscores, beginning with a letter"
 
 RECORDER, LABORATORY, LAUNCHER, CONSOLE = "recorder", "laboratory", "launcher", "console"
+FOXGLOVE, ROS2 = "foxglove", "ros2"
 OF_THE_BUS = frozenset({"rig", "record", "alive", "all"})
 """First words of keys on the bus and of requests that stand for neither a vehicle nor a process."""
-OF_THE_LAUNCHER = frozenset({RECORDER, LABORATORY, LAUNCHER, CONSOLE, "hub", "fork_server", "lockstep"})
+OF_THE_LAUNCHER = frozenset(
+    {RECORDER, LABORATORY, LAUNCHER, CONSOLE, FOXGLOVE, ROS2, "hub", "fork_server", "lockstep"}
+)
 """Processes that run no nodes of a rig."""
 
 _NAME = re.compile(PATTERN)

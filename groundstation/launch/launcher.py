@@ -26,6 +26,7 @@ from groundstation.launch.attendant import Attendant
 from groundstation.launch.child import REFUSAL, Child, start_python
 from groundstation.launch.fork_server import ForkServer
 from groundstation.launch.forking import share_one_arena
+from groundstation.launch.guests import Guests
 from groundstation.launch.memory import claim_memory
 from groundstation.launch.orders import Go, Orders
 from groundstation.launch.running_time import RunningTime
@@ -60,6 +61,7 @@ class Launcher:
         say: Takes one line about what happens.
         hub_port: Of the hub on loopback; 0 for a free one.
         attendants: Processes beside the rig's; no flight waits for them.
+        guests: Where programs of other hosts connect; None: nowhere.
 
     Raises:
         RigError: The rig names a laboratory that is not installed.
@@ -75,6 +77,7 @@ class Launcher:
         *,
         hub_port: int = 0,
         attendants: Iterable[Attendant] = (),
+        guests: Guests | None = None,
     ) -> None:
         self._rig_path = rig_path
         self._rig_text = rig_text
@@ -82,6 +85,7 @@ class Launcher:
         self._recording = recording
         self._say = say
         self._hub_port = hub_port
+        self._guests = guests
         self._addresses: dict[str, Address] | None = None if rig.laboratory is not None else {}
         self._tidings: queue.SimpleQueue[tuple[str, bool]] = queue.SimpleQueue()
         self._children = {name: Child(name) for name in processes_of(rig)}
@@ -109,7 +113,7 @@ class Launcher:
         if self._laboratory is not None:
             self._start_laboratory(self._laboratory)  # it takes longest
         self._fork_server.start()  # before the hub, which has threads
-        self.endpoint, self.bus = _open_hub(self._hub_port)
+        self.endpoint, self.bus = _open_hub(self._hub_port, self._guests)
         self.bus.keep_wanted(key_of(Ack.TOPIC, "*"))  # who asks has come just before
         self.bus.watch(lambda name, alive: self._tidings.put((name, alive)))
 
@@ -351,8 +355,8 @@ def _raise_refusal(child: Child) -> None:
         raise RigError(child.last_words.removeprefix("groundstation: "))
 
 
-def _open_hub(port: int) -> tuple[str, ZenohBus]:
-    """The hub on a port of loopback, on a free one if it is 0.
+def _open_hub(port: int, guests: Guests | None) -> tuple[str, ZenohBus]:
+    """The hub on a port of loopback, on a free one if it is 0; and where guests connect.
 
     Raises:
         GroundStationError: There is no loopback, or somebody has the port.
@@ -370,7 +374,10 @@ def _open_hub(port: int) -> tuple[str, ZenohBus]:
         ) from error
     endpoint = f"tcp/127.0.0.1:{port or address[1]}"
     with going_first():  # its threads, which pass on everybody's messages
-        return endpoint, ZenohBus(endpoint, is_hub=True)
+        if guests is None:
+            return endpoint, ZenohBus(endpoint, is_hub=True)
+        also_at, settings = (guests.endpoint,), guests.settings()
+        return endpoint, ZenohBus(endpoint, is_hub=True, also_at=also_at, settings=settings)
 
 
 def _package_of(name: str) -> str:

@@ -14,6 +14,7 @@ from groundstation.declarations.errors import GroundStationError
 from groundstation.declarations.names import LAUNCHER
 from groundstation.declarations.rig import Rig
 from groundstation.launch.attendant import Attendant
+from groundstation.launch.guests import Guests
 from groundstation.launch.launcher import START_S, Launcher
 from groundstation.launch.running import RunningRig
 from groundstation.launch.running_time import RunningTime
@@ -42,6 +43,7 @@ class LiveRun:
         watchers: By noun: take the messages of a topic besides, encoded.
         hub_port: Of the hub on loopback; 0 for a free one.
         attendants: Processes beside the rig's.
+        guests: Where programs of other hosts connect; None: nowhere.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class LiveRun:
         watchers: Mapping[str, Callable[[Recorded], None]] = MappingProxyType({}),
         hub_port: int = 0,
         attendants: Iterable[Attendant] = (),
+        guests: Guests | None = None,
     ) -> None:
         self.rig = rig
         self.recording = recording
@@ -65,6 +68,7 @@ class LiveRun:
             self.monitor.note,
             hub_port=hub_port,
             attendants=attendants,
+            guests=guests,
         )
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())

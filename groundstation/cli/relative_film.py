@@ -1,0 +1,128 @@
+"""A film through a tracker: answers, the annotated film, the page of the review."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.cli.progress import progress_line
+from groundstation.cli.relative_review import Review
+from groundstation.data_sets.relative_film import Film, Shot
+from groundstation.declarations.errors import UsageError
+from groundstation.files.errors import FileError
+from groundstation.relative_navigation.answers import Track
+from groundstation.relative_navigation.motion_models import Tracker
+from groundstation.relative_navigation.overlay import draw_track
+from groundstation.relative_navigation.spots import SpotFinder, SpotSettings, SpotsSeen, Trouble, nothing
+from groundstation.relative_navigation.tracker_settings import Frame, TrackerSettings
+
+Picture = NDArray[np.uint8]
+
+CODECS = {".avi": "MJPG", ".mp4": "mp4v"}
+"""Ending to codec of an annotated film."""
+_PREVIEW_HZ = 30.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilmAnswers:
+    """What became of a film.
+
+    Attributes:
+        answers: Each frame's answer and its CPU time, ms.
+        notes: For people: what was wrong with the pictures.
+    """
+
+    answers: list[tuple[Track, float]]
+    notes: list[str]
+
+
+def track_film(
+    film: Film,
+    settings: TrackerSettings,
+    looks: SpotSettings,
+    tracker: Tracker,
+    annotated: Path | None,
+    review: Review | None,
+) -> FilmAnswers:
+    """Give every frame to a tracker, and draw what is wanted."""
+    cv2.setNumThreads(1)
+    finder = SpotFinder(looks)
+    finder.look(np.zeros((settings.camera.height_px, settings.camera.width_px), np.uint8))
+    answers: list[tuple[Track, float]] = []
+    troubles: Counter[Trouble] = Counter()
+    with progress_line() as progress, _writer(annotated, film, settings) as write:
+        for shot in film.shots():
+            begin = time.process_time()
+            seen = _seen(shot, finder)
+            track = tracker.look(Frame(shot.number, shot.t_s, seen.centres))
+            answers.append((track, 1000.0 * (time.process_time() - begin)))
+            troubles[seen.trouble] += 1
+            if annotated is not None or (review is not None and review.wants(track)):
+                picture = shot.picture if shot.picture is not None else _black(settings)
+                drawn = draw_track(picture, settings.camera, settings.target, track, seen.centres)
+                write(drawn)
+                if review is not None and review.wants(track):
+                    review.add(track, drawn)
+            progress("tracking", shot.number / film.count if film.count else float("nan"))
+    notes = [
+        f"{trouble.value}: {troubles[trouble]}" for trouble in Trouble if trouble.value and troubles[trouble]
+    ]
+    if film.broken_from is not None:
+        notes.append(f"the film is broken from frame {film.broken_from} of {film.count} on")
+    return FilmAnswers(answers, notes)
+
+
+def _seen(shot: Shot, finder: SpotFinder) -> SpotsSeen:
+    return nothing(shot.trouble) if shot.picture is None else finder.look(shot.picture)
+
+
+def _black(settings: TrackerSettings) -> Picture:
+    return np.zeros((settings.camera.height_px, settings.camera.width_px), np.uint8)
+
+
+def check_annotated(path: Path | None) -> None:
+    """Refuse a name that no film of ours has.
+
+    Raises:
+        UsageError: The ending is none of `CODECS`.
+    """
+    if path is not None and path.suffix.lower() not in CODECS:
+        raise UsageError(f"--annotated must end in {' or '.join(CODECS)}, found {path.name!r}.")
+
+
+class _Write:
+    """Writes frames into a film, or nowhere."""
+
+    def __init__(self, writer: cv2.VideoWriter | None) -> None:
+        self._writer = writer
+
+    def __call__(self, drawn: Picture) -> None:
+        if self._writer is not None:
+            self._writer.write(drawn)
+
+
+@contextmanager
+def _writer(path: Path | None, film: Film, settings: TrackerSettings) -> Iterator[_Write]:
+    """Give what writes the annotated film; it takes its place when all has gone well."""
+    if path is None:
+        yield _Write(None)
+        return
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part.") as folder:
+        part = Path(folder) / path.name
+        size = (settings.camera.width_px, settings.camera.height_px)
+        rate = film.rate_hz if film.rate_hz > 0.5 else _PREVIEW_HZ
+        writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()]), rate, size)
+        if not writer.isOpened():
+            raise FileError(f"{path}: this installation of OpenCV cannot write such a film.")
+        yield _Write(writer)
+        writer.release()
+        part.replace(path)

@@ -1,0 +1,281 @@
+"""Poses and motion put together: a filter over frames that learns how much of the motion no model explains.
+
+Seven filters run side by side on the same frames. The one in the middle answers; each of the others believes
+in ten times more or less unmodelled motion of one kind (turning, along the line of sight, across it). When a
+neighbour has explained the last frames clearly better than the middle, the middle moves there. So a body that
+flies as Hill and Euler say is averaged over many frames, one that is pushed about is followed, and in both
+cases the covariance is that of the motion that was met.
+
+A frame comes in as the information that its pixels hold about the pose near the solver's answer, not as a
+pose with an inverse covariance: a frame that leaves a direction unknown adds nothing there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.relative_navigation.motion import (
+    ACCELERATION,
+    POSITION,
+    RATE,
+    STATE,
+    TURN,
+    VELOCITY,
+    CameraCraft,
+    Motions,
+    Unmodelled,
+    advance,
+    noise_over,
+)
+from groundstation.relative_navigation.pose import Pose
+from groundstation.relative_navigation.rotations import rotation_vectors, turns
+
+Floats = NDArray[np.float64]
+
+STEP = 10.0
+"""Between neighbours, of the density of what is unmodelled."""
+MEMBERS = 7
+_OFFSETS = np.array(
+    [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64
+)
+"""Powers of `STEP` by member: of turning, along, across."""
+_EYE, _EYE6 = np.eye(STATE), np.eye(6)
+MEMORY = 0.97
+"""Share of the evidence kept from frame to frame: some thirty frames count."""
+CLEARLY_BETTER = 1.2
+"""Log of the likelihood ratio at which the middle moves."""
+FIRST_TURN_RAD, FIRST_SHARE = 0.7, 0.15
+"""Between the first two frames, one sigma: a turn, and a move by this share of its distance."""
+TURN_FRAMES, ALONG_FRAMES, ACROSS_FRAMES = 12.0, 8.0, 2.0
+"""How many frames the first belief averages over; across, a camera's own pointing comes in."""
+SURPRISE = 25.0
+"""Squared miss of a prediction in sigmas, three numbers or fewer, at which that motion is believed less."""
+MOST_REOPENINGS = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameInformation:
+    """What a frame says: the log of its likelihood is ``-(d I d - 2 b d + cost)/2`` for errors d of a pose.
+
+    Attributes:
+        pose: Where it was taken; of the centre of mass.
+        information: I, (6, 6).
+        gradient: b, (6,).
+        cost: Sum of squares of the whitened residuals there.
+    """
+
+    pose: Pose
+    information: Floats
+    gradient: Floats
+    cost: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionEstimate:
+    """What the filter believes at a time, of the target's centre of mass.
+
+    Attributes:
+        pose: Camera axes.
+        velocity_m_s: In the orbital frame, orbital axes, (3,).
+        rate_rad_s: Absolute, body axes, (3,).
+        covariance: (12, 12): position, turn, velocity, rate.
+    """
+
+    pose: Pose
+    velocity_m_s: Floats
+    rate_rad_s: Floats
+    covariance: Floats
+
+
+class MotionFilter:
+    """A target followed over frames.
+
+    Args:
+        craft: The craft that carries the camera.
+        inertia_kg_m2: Of the target, (3,); None: its rates stay as they are but for noise.
+        t_s: Of the first frame.
+        first: Its information.
+        covariance: Of its pose, (6, 6).
+    """
+
+    def __init__(
+        self, craft: CameraCraft, inertia_kg_m2: Floats | None, t_s: float, first: Pose, covariance: Floats
+    ) -> None:
+        self.t_s = t_s
+        self.frames = 1
+        self._craft, self._inertia = craft, inertia_kg_m2
+        zeros = np.zeros((MEMBERS, 3))
+        self._motions = Motions(
+            np.broadcast_to(first.camera_from_body, (MEMBERS, 3, 3)).copy(),
+            zeros + first.position_camera_m,
+            zeros.copy(),
+            zeros.copy(),
+            zeros.copy(),
+        )
+        if craft.orbital_rate_rad_s > 0.0:  # a camera that keeps still in the orbital frame sees it turn
+            self._motions.rate_rad_s += first.camera_from_body.T @ (
+                craft.camera_from_orbital(t_s) @ np.array((0.0, 0.0, craft.orbital_rate_rad_s))
+            )
+        self._covariance = np.zeros((MEMBERS, STATE, STATE))
+        self._covariance[:, :6, :6] = covariance
+        self._levels = np.zeros(3)
+        self._unit = np.ones((3, 1))
+        self._evidence = np.zeros(MEMBERS)
+        self._before = (t_s, self._motions, self._covariance)
+
+    def predict(self, t_s: float) -> None:
+        """Carry all members to a time."""
+        dt = t_s - self.t_s
+        if dt == 0.0:
+            return
+        if self.frames == 1:
+            self._widen(dt)
+        self._before = (self.t_s, self._motions, self._covariance)
+        self._motions, carried = advance(self._motions, self._craft, self._inertia, self.t_s, t_s)
+        density = np.power(STEP, self._levels + _OFFSETS).T
+        noise = Unmodelled(*(density * self._unit))
+        added = noise_over(self._motions, noise, self._craft.camera_from_orbital(t_s), dt)
+        self._covariance = carried @ self._covariance @ carried.transpose(0, 2, 1) + added
+        self.t_s = t_s
+
+    def reopen(self, pose: Pose) -> None:
+        """Believe the models less until the last prediction could have led to a pose that a frame showed.
+
+        Only what the frame contradicts is believed less: turning, motion along the line of sight, or across
+        it.
+        """
+        if self.frames < 2:
+            return
+        t_s = self.t_s
+        for _ in range(MOST_REOPENINGS):
+            mean, covariance = self.prior
+            off = pose.minus(mean)
+            sight = mean.position_camera_m / np.linalg.norm(mean.position_camera_m)
+            side = np.eye(3) - np.outer(sight, sight)
+            _, axes = np.linalg.eigh(side)
+            surprises = (
+                _square(off[3:], covariance[3:, 3:]),
+                _square(off[:3] @ axes[:, :1], axes[:, :1].T @ covariance[:3, :3] @ axes[:, :1]),
+                _square(off[:3] @ axes[:, 1:], axes[:, 1:].T @ covariance[:3, :3] @ axes[:, 1:]),
+            )
+            worse = np.array([surprise > SURPRISE for surprise in surprises])
+            if not worse.any():
+                return
+            self._levels = self._levels + worse
+            self._evidence = np.zeros(MEMBERS)
+            self.t_s, self._motions, self._covariance = self._before
+            self.predict(t_s)
+
+    def _widen(self, dt: float) -> None:
+        """Before the second frame nothing is known of rates: their scale comes from frames and distance."""
+        reach = FIRST_SHARE * float(np.linalg.norm(self._motions.position_m[0])) / dt
+        diagonal = self._covariance[:, range(STATE), range(STATE)]
+        diagonal[:, VELOCITY] = reach**2
+        diagonal[:, RATE] = (FIRST_TURN_RAD / dt) ** 2
+        diagonal[:, ACCELERATION] = (0.3 * reach / dt) ** 2
+        self._covariance[:, range(STATE), range(STATE)] = diagonal
+        pose = self._covariance[0, :6, :6]
+        sight = self._motions.position_m[0] / np.linalg.norm(self._motions.position_m[0])
+        along = float(sight @ pose[:3, :3] @ sight)
+        across = 0.5 * (float(np.trace(pose[:3, :3])) - along)
+        turn = float(np.trace(pose[3:, 3:])) / 3.0
+        units = (
+            turn / (TURN_FRAMES**4 * dt**3),
+            along / (ALONG_FRAMES**6 * dt**5),
+            across / (ACROSS_FRAMES**6 * dt**5),
+        )
+        self._unit = np.maximum(np.array(units)[:, None], 1e-30)
+
+    @property
+    def prior(self) -> tuple[Pose, Floats]:
+        """Predicted pose of the middle member and its covariance (6, 6)."""
+        motions = self._motions
+        return Pose(motions.rotation[0], motions.position_m[0]), self._covariance[0, :6, :6]
+
+    def update(self, frame: FrameInformation) -> float:
+        """Take a frame at the time of the last prediction.
+
+        Returns:
+            Log of the likelihood that the middle member gave it, up to a constant.
+        """
+        off = np.empty((MEMBERS, 6))
+        off[:, :3] = self._motions.position_m - frame.pose.position_camera_m
+        off[:, 3:] = rotation_vectors(self._motions.rotation @ frame.pose.camera_from_body.T)
+        weighed = off @ frame.information
+        slope = frame.gradient - weighed  # at each member's prediction
+        top = self._covariance[:, :6, :]
+        # gain G = P E' (1 + I E P E')^-1, so that the step is G slope
+        spread = _EYE6 + frame.information @ top[:, :, :6]
+        gain = np.linalg.solve(spread.transpose(0, 2, 1), top).transpose(0, 2, 1)
+        step = (gain @ slope[:, :, None])[:, :, 0]
+        # (1 - G I E) P (1 - G I E)' + G I G': stays positive whatever the ratio of prior and frame
+        leak = gain @ frame.information
+        keep = np.broadcast_to(_EYE, (MEMBERS, STATE, STATE)).copy()
+        keep[:, :, :6] -= leak
+        covariance = keep @ self._covariance @ keep.transpose(0, 2, 1) + leak @ gain.transpose(0, 2, 1)
+        self._covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
+        explained = (slope * step[:, :6]).sum(axis=1)
+        missed = 2.0 * (off @ frame.gradient) - (off * weighed).sum(axis=1)
+        likelihood = 0.5 * (explained + missed - np.linalg.slogdet(spread)[1] - frame.cost)
+        self._move(step)
+        self.frames += 1
+        if self.frames > 3:  # before, the wide beliefs about rates decide
+            self._learn(likelihood)
+        return float(likelihood[0])
+
+    def _move(self, step: Floats) -> None:
+        motions = self._motions
+        motions.position_m = motions.position_m + step[:, POSITION]
+        rotation = turns(step[:, TURN]) @ motions.rotation
+        motions.rotation = rotation @ (1.5 * np.eye(3) - 0.5 * (rotation.transpose(0, 2, 1) @ rotation))
+        motions.velocity_m_s = motions.velocity_m_s + step[:, VELOCITY]
+        motions.rate_rad_s = motions.rate_rad_s + step[:, RATE]
+        motions.acceleration_m_s2 = motions.acceleration_m_s2 + step[:, ACCELERATION]
+
+    def _learn(self, likelihood: Floats) -> None:
+        self._evidence = MEMORY * self._evidence + likelihood
+        best = int(self._evidence.argmax())
+        if self._evidence[best] - self._evidence[0] < CLEARLY_BETTER:
+            return
+        self._levels = self._levels + _OFFSETS[best]
+        opposite = int(np.flatnonzero(np.all(np.equal(_OFFSETS, -_OFFSETS[best]), axis=1))[0])
+        source = np.full(MEMBERS, best)
+        source[opposite] = 0
+        motions = self._motions
+        for name in ("rotation", "position_m", "velocity_m_s", "rate_rad_s", "acceleration_m_s2"):
+            setattr(motions, name, getattr(motions, name)[source])
+        self._covariance = self._covariance[source]
+        self._evidence = np.where(source == best, 0.0, self._evidence[0] - self._evidence[best])
+
+    @property
+    def estimate(self) -> MotionEstimate:
+        """What the middle member believes."""
+        motions = self._motions
+        return MotionEstimate(
+            Pose(motions.rotation[0], motions.position_m[0]),
+            motions.velocity_m_s[0],
+            motions.rate_rad_s[0],
+            self._covariance[0, :12, :12],
+        )
+
+    @property
+    def unmodelled(self) -> tuple[float, float, float]:
+        """Learned densities: turning rad^2/s^3, along and across the line of sight m^2/s^5."""
+        if self.frames == 1:
+            return 0.0, 0.0, 0.0
+        turn, along, across = (np.power(STEP, self._levels) * self._unit[:, 0]).tolist()
+        return turn, along, across
+
+    def has_finite_state(self) -> bool:
+        """Whether nothing has run away."""
+        return math.isfinite(float(self._covariance.sum())) and math.isfinite(
+            float(self._motions.rotation.sum())
+        )
+
+
+def _square(off: Floats, covariance: Floats) -> float:
+    return float(off @ np.linalg.solve(covariance, off))

@@ -1,0 +1,104 @@
+"""What ``groundstation status`` shows of a rig that runs, on 80 columns and as JSON."""
+
+import json
+import os
+import threading
+
+import pytest
+
+from groundstation.bus.cdr import ros_fields
+from groundstation.cli import status as command
+from groundstation.declarations.lease import Lease
+from groundstation.launch.running import RunningRig
+from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.parts.supervision.messages import Faults, Supervision
+from groundstation.parts.valves.messages import ValveStatus
+
+ZEROS = {"string": "", "bool": False, "string[]": (), "float64[]": ()}
+
+
+def zero(ros):
+    if ros in ZEROS:
+        return ZEROS[ros]
+    if ros.endswith("]"):
+        return (0.0,) * int(ros.partition("[")[2][:-1])
+    return 0.0 if ros.startswith("float") else 0
+
+
+def made(kind, vehicle="", **known):
+    return kind(0, vehicle, *(known.pop(name, None) or zero(ros) for name, ros in ros_fields(kind)))
+
+
+def everything(name):
+    return (
+        made(Supervision, name, mode="flying", cause="it holds its pose", air_on=True),
+        made(
+            Faults, name, ids=("dead_sky",), whats=("No fix for 7 s.",), details=("",), since_ns=(1.0,),
+            responses=("flies on",), advices=("Look.",), gone_ns=(0.0,),
+        ),
+        made(ValveStatus, name, floating=True, pressure_pa=1.87e7),
+        made(VehicleState, name, position_table_m=(0.1, 0.2)),
+        made(FusionStatus, name, fix_age_s=0.05),
+        made(Latency, name, stages=("bus",), p50_s=(0.0213,), p99_s=(0.0299,)),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def publishing(fake_run):
+    """Publishes everything, again and again, until the test is over."""
+    done = threading.Event()
+
+    def publish():
+        rig = (made(Lease), made(RecorderStatus, path="r.mcap", written_bytes=3_000_000, free_bytes=10**11))
+        while not done.wait(0.02):
+            fake_run.publish(*everything("alpha"), *everything("beta"), *rig)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    yield fake_run
+    done.set()
+    thread.join()
+
+
+def test_everything_is_on_one_screen_of_80_columns(publishing, groundstation, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = groundstation("status").output.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    text = "\n".join(lines)
+    for words in (
+        "a rig (process", "nobody holds it", "3.0 MB, 100 GB free", "187 bar", "flying", "21.3 / 29.9 ms",
+        "alpha: flying: it holds its pose", "beta: FAULT dead_sky",
+    ):  # fmt: skip
+        assert words in text
+
+
+def test_as_json_it_is_si(publishing, groundstation):
+    (rig,) = json.loads(groundstation("status", "--json").output)
+    alpha = rig["vehicles"]["alpha"]
+    assert (alpha["mode"], alpha["pressure_pa"], alpha["position_table_m"]) == ("flying", 1.87e7, [0.1, 0.2])
+    assert rig["recorder"]["free_bytes"] == 10**11
+    assert rig["endpoint"] == publishing.run.endpoint
+
+
+def test_a_rig_that_publishes_nothing_is_shown_as_that(fake_run, groundstation, monkeypatch):
+    monkeypatch.setattr(command, "LOOKS_S", 0.1)
+    output = groundstation("status").output
+    assert "alpha: no ruling was published" in output
+    assert "recorder  none" in output
+
+
+def test_no_rig_is_no_error(tmp_path, monkeypatch, groundstation):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    shown = groundstation("status")
+    assert (shown.exit_code, "no rig is running" in shown.output) == (0, True)
+    assert json.loads(groundstation("status", "--json").output) == []
+
+
+def test_a_rig_that_cannot_be_reached_is_named(tmp_path, monkeypatch, groundstation):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    RunningRig(os.getpid(), "gone", "tcp/127.0.0.1:9", ("alpha",)).announce()
+    shown = groundstation("status")
+    assert shown.exit_code == 1
+    assert "NOT REACHED" in shown.output

@@ -1,0 +1,166 @@
+"""Orbits and spins beside numerical integration; the published quantities of a precession."""
+
+import numpy as np
+import pytest
+from oracles import relative_scenes as scenes
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from groundstation.relative_navigation.attitude_motion import Vertical, turn_on
+from groundstation.relative_navigation.hill import hill_constants, hill_response, hill_transition
+from groundstation.relative_navigation.motion import CameraCraft, Motions, advance
+from groundstation.relative_navigation.precession import AxialInertia, precess, precession_of, rate_after
+
+RATE = 1.106819e-3  # rad/s, of the published elements of Progress
+
+
+def hill_matrix(n):
+    a = np.zeros((6, 6))
+    a[:3, 3:] = np.eye(3)
+    a[3, 0], a[3, 4], a[4, 3], a[5, 2] = 3 * n**2, 2 * n, -2 * n, -(n**2)
+    return a
+
+
+@pytest.mark.parametrize("rate", [0.0, 1e-9, RATE])
+def test_hills_closed_form_is_the_matrix_exponential(rate):
+    for t in (0.033, 4.0, 900.0, 6000.0):
+        big = np.zeros((9, 9))
+        big[:6, :6] = hill_matrix(rate)
+        big[3:6, 6:] = np.eye(3)
+        exact = expm(big * t)
+        assert hill_transition(rate, t) == pytest.approx(exact[:6, :6], rel=1e-9, abs=1e-9)
+        assert hill_response(rate, t) == pytest.approx(exact[:6, 6:], rel=1e-7, abs=1e-9)
+
+
+def test_the_published_constants_draw_the_published_curve(rng):
+    position, velocity = rng.normal(0, 10, 3), rng.normal(0, 0.02, 3)
+    c = hill_constants(position, velocity, RATE)
+    for t in (0.0, 500.0, 4000.0):
+        z, x, y = (hill_transition(RATE, t) @ np.r_[position, velocity])[:3]
+        w = RATE * t
+        assert x == pytest.approx(c.c4 - 3 * c.c1 * w + 2 * c.c2 * np.cos(w) - 2 * c.c3 * np.sin(w))
+        assert y == pytest.approx(c.c5 * np.sin(w) + c.c6 * np.cos(w))
+        assert z == pytest.approx(2 * c.c1 + c.c2 * np.sin(w) + c.c3 * np.cos(w))
+        middle_x, middle_z = c.centre_m(t)  # the ellipse is twice as long as high
+        assert ((x - middle_x) / c.semi_axes_m[1]) ** 2 + (
+            (z - middle_z) / c.semi_axes_m[0]
+        ) ** 2 == pytest.approx(1)
+    assert not c.is_bounded()
+    still = hill_constants(position, np.array([velocity[0], -2 * RATE * position[0], velocity[2]]), RATE)
+    assert still.is_bounded()
+    assert still.drift_m_rev == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(ValueError, match="above zero"):
+        hill_constants(position, velocity, 0.0)
+
+
+def test_a_free_body_turns_as_integration_says(rng):
+    for size, span in ((0.01, 4.0), (0.5, 1.0), (2.0, 5.0)):
+        rate = size * rng.normal(size=3)
+        times = np.array([0.0, span])
+        rotations, rates = scenes.spin(times, Rotation.identity(), rate, scenes.INERTIA)
+        turned = turn_on(rate[None], scenes.INERTIA, span)
+        off = Rotation.from_matrix(turned.turns[0]).inv() * rotations[-1]
+        assert off.magnitude() < 3e-5 * max(1.0, size * span)
+        assert turned.rates_rad_s[0] == pytest.approx(rates[-1], abs=3e-5 * size)
+
+
+def test_gravity_turns_a_body_towards_the_vertical(rng):
+    """The torque of the reference, integrated in inertial space with the vertical going round."""
+    start, rate = Rotation.random(random_state=3), rng.normal(0, 1e-3, 3)
+
+    def torque(t, inertial_from_body):
+        up = inertial_from_body.inv().apply([np.cos(RATE * t), np.sin(RATE * t), 0.0])
+        return 3 * RATE**2 * np.cross(up, scenes.INERTIA * up)
+
+    times = np.array([0.0, 300.0])
+    rotations, rates = scenes.spin(times, start, rate, scenes.INERTIA, torque)
+    body = start.inv()
+    vertical = Vertical(body.apply([1.0, 0, 0])[None], body.apply([0, 0, 1.0])[None], RATE)
+    turned = turn_on(rate[None], scenes.INERTIA, 300.0, vertical)
+    free = turn_on(rate[None], scenes.INERTIA, 300.0)
+    exact = start.inv() * rotations[-1]
+    assert (Rotation.from_matrix(turned.turns[0]).inv() * exact).magnitude() < 3e-5
+    assert turned.rates_rad_s[0] == pytest.approx(rates[-1], abs=1e-7)
+    assert (Rotation.from_matrix(free.turns[0]).inv() * exact).magnitude() > 1e-3
+
+
+@pytest.mark.parametrize("inertia", [scenes.INERTIA, None])
+@pytest.mark.parametrize("size", [0.02, 0.4])
+def test_errors_of_a_motion_go_on_as_differences_say(rng, inertia, size):
+    tilt = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
+    craft = CameraCraft(
+        RATE, lambda t: Rotation.from_rotvec([0, 0, 0.01 * t]).as_matrix() @ tilt, np.array([0.1, 0.2, 0.3])
+    )
+    rotation = Rotation.random(random_state=5).as_matrix()
+    base = [
+        rotation,
+        np.array([0.5, -0.2, 6.0]),
+        rng.normal(0, 0.01, 3),
+        size * rng.normal(size=3),
+        rng.normal(0, 1e-4, 3),
+    ]
+
+    def after(step):
+        motions = Motions(
+            (Rotation.from_rotvec(step[3:6]).as_matrix() @ base[0])[None],
+            (base[1] + step[:3])[None],
+            (base[2] + step[6:9])[None],
+            (base[3] + step[9:12])[None],
+            (base[4] + step[12:])[None],
+        )
+        return advance(motions, craft, inertia, 10.0, 12.0)
+
+    middle, carried = after(np.zeros(15))
+    found = np.empty((15, 15))
+    for k in range(15):
+        ends = []
+        for sign in (1, -1):
+            step = np.zeros(15)
+            step[k] = sign * 1e-6
+            end, _ = after(step)
+            turned = Rotation.from_matrix(end.rotation[0] @ middle.rotation[0].T).as_rotvec()
+            ends.append(
+                np.r_[
+                    end.position_m[0],
+                    turned,
+                    end.velocity_m_s[0],
+                    end.rate_rad_s[0],
+                    end.acceleration_m_s2[0],
+                ]
+            )
+        found[:, k] = (ends[0] - ends[1]) / 2e-6
+    # the torque's change with the attitude is left out: 3 n^2 over the span
+    assert carried[0] == pytest.approx(found, abs=0.003 if size > 0.1 else 2e-4)
+
+
+def test_a_camera_on_a_turning_craft_sees_what_flies_straight_turn(rng):
+    """Against a simulation in inertial space: nobody turns but the camera's craft."""
+    craft = CameraCraft(RATE, lambda _t: np.eye(3))
+    motions = Motions(
+        np.eye(3)[None], np.array([[0.0, 0, 5.0]]), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))
+    )
+    after, _ = advance(motions, craft, None, 0.0, 100.0)
+    expected = Rotation.from_rotvec([0, 0, -RATE * 100.0])  # the orbital frame turns on by +n about z
+    assert after.rotation[0] == pytest.approx(expected.as_matrix(), abs=1e-12)
+
+
+def test_the_precession_of_the_published_stage():
+    """Reference 0.2 item 12: alpha 72.64 deg, psi' -1.4817 deg/s as printed, +1.4817 about the momentum."""
+    inertia, rate = AxialInertia(2548.0, 14406.0), np.deg2rad([-2.5, 1.0, 1.0])
+    found = precession_of(rate, inertia)
+    assert np.degrees(found.half_angle_rad) == pytest.approx(72.63729708902619)
+    assert np.degrees(found.published_rate_rad_s) == pytest.approx(-1.4817288500345671)
+    assert np.degrees(found.rate_rad_s) == pytest.approx(1.4817288500345662)
+    assert np.degrees(found.axis_angle_rad) == pytest.approx(180.0 - 72.63729708902619)
+    times = np.array([0.0, 0.5, 20.0, 200.0])
+    exact, rates = scenes.spin(
+        times, Rotation.random(random_state=1), rate, np.array([2548.0, 14406.0, 14406.0])
+    )
+    ours = precess(exact[0].as_matrix(), rate, inertia, times)
+    for k in range(4):
+        assert ours[k] == pytest.approx(exact[k].as_matrix(), abs=1e-7)
+        assert rate_after(rate, inertia, times[k]) == pytest.approx(rates[k], abs=1e-8)
+    with pytest.raises(ValueError, match="no body"):
+        AxialInertia(3.0, 1.0)
+    with pytest.raises(ValueError, match="does not turn"):
+        precession_of(np.zeros(3), inertia)

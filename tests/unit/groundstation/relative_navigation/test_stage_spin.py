@@ -1,0 +1,132 @@
+"""Rates of a stage: their errors beside the bound; the published statistics by hand."""
+
+import json
+
+import numpy as np
+import pytest
+from oracles import relative_scenes as scenes
+from scipy.spatial.transform import Rotation
+
+from groundstation.files.errors import FileError
+from groundstation.relative_navigation.error_table import PUBLISHED_STAGE, error_statistics
+from groundstation.relative_navigation.precession import AxialInertia
+from groundstation.relative_navigation.stage_spin import LeavingCamera, Stage, StageRun, fit_stage
+
+RING = np.array(
+    [[-0.35 * (k % 2 == 0), 1.25 * np.cos(k * np.pi / 3), 1.25 * np.sin(k * np.pi / 3)] for k in range(6)]
+)
+INERTIA = np.array([2548.0, 14406.0, 14406.0])
+RATE = np.deg2rad([-2.5, 1.0, 1.0])
+STAGE = Stage(AxialInertia(2548.0, 14406.0), RING, LeavingCamera(600.0, 2.0, 1.0))
+
+
+def exact(times, start=None, rate=RATE):
+    """Rows t, marker, u, v: the spin is integrated, the camera is 2 + t before the stage."""
+    rotations, _ = scenes.spin(np.asarray(times), start or Rotation.identity(), rate, INERTIA)
+    rows = []
+    for t, rotation in zip(times, rotations, strict=True):
+        for marker, (x, y, z) in enumerate(rotation.apply(RING)):
+            depth = 2.0 + t - x
+            rows.append((t, marker, 600.0 * y / depth, 600.0 * z / depth))
+    return np.array(rows)
+
+
+def run_of(rows):
+    return StageRun(rows[:, 0], rows[:, 1].astype(np.int64), rows[:, 2:])
+
+
+def test_without_noise_the_rate_is_exact_from_any_attitude():
+    for start in (Rotation.identity(), Rotation.from_rotvec([0.2, -0.3, 0.4])):
+        fit = fit_stage(STAGE, run_of(exact([0.0, 0.5, 1.0], start)), 1e-3)
+        assert fit.converged
+        assert fit.rate_rad_s == pytest.approx(RATE, abs=1e-8)
+        assert fit.start == pytest.approx(start.as_matrix(), abs=1e-7)
+
+
+def test_errors_of_three_frames_are_those_of_the_bound(rng):
+    """Reference 4.4: 0.1165, 0.2612, 0.2621 deg/s for three frames at 1 px."""
+    rows = exact([0.0, 0.5, 1.0])
+    errors, squares = [], []
+    for _ in range(120):
+        noisy = rows + np.c_[np.zeros((len(rows), 2)), rng.normal(0.0, 1.0, (len(rows), 2))]
+        fit = fit_stage(STAGE, run_of(noisy), 1.0)
+        errors.append(np.degrees(fit.rate_rad_s - RATE))
+        squares.append(
+            (fit.rate_rad_s - RATE) @ np.linalg.solve(fit.covariance[3:, 3:], fit.rate_rad_s - RATE)
+        )
+    bound = np.array([0.1165, 0.2612, 0.2621])
+    assert np.degrees(np.sqrt(np.diag(fit.covariance)[3:])) == pytest.approx(bound, rel=0.03)
+    ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(bound**2))
+    assert 0.85 < ratio < 1.15
+    assert np.mean(squares) == pytest.approx(3.0, abs=0.7)
+
+
+def test_the_published_formulas_by_hand():
+    found = error_statistics(np.array([1.0, -2.0, 4.0]))
+    assert (found.mean, found.mean_absolute) == (pytest.approx(1.0), pytest.approx(7.0 / 3.0))
+    assert found.published_variance == pytest.approx(21.0 / 6.0)  # sum of squares over n (n - 1)
+    assert found.variance == pytest.approx(9.0)
+    assert found.rms == pytest.approx(np.sqrt(7.0))
+    with pytest.raises(ValueError, match="at least two"):
+        error_statistics(np.ones(1))
+
+
+def test_the_printed_d_is_a_variance_of_the_mean():
+    """Reference 0.2 item 13: the true rms of a run is sqrt(D (n - 1)), 0.132, 0.242, 0.177 deg/s."""
+    rms = [np.sqrt(499 * d) for _, d, _ in PUBLISHED_STAGE.values()]
+    assert rms == pytest.approx([0.132, 0.242, 0.177], abs=5e-4)
+
+
+@pytest.fixture
+def files(tmp_path, rng):
+    rows = exact([0.0, 0.5, 1.0])
+    lines = ["run,t,marker,u,v"]
+    for run in range(3):
+        noisy = rows + np.c_[np.zeros((len(rows), 2)), rng.normal(0.0, 1.0, (len(rows), 2))]
+        lines += [f"{run}," + ",".join(f"{x:.7g}" for x in row) for row in noisy]
+    (tmp_path / "3frames.csv").write_text("\n".join(lines) + "\n")
+    stage = {
+        "In": 14406.0,
+        "Ix": 2548.0,
+        "omega_deg_s": [-2.5, 1, 1],
+        "markers_m": RING.tolist(),
+        "f_px": 600.0,
+        "camera": "at (2+t,0,0) m; looks along -x",
+        "sigma_px": {"3frames": 1.0},
+    }
+    (tmp_path / "stage.json").write_text(json.dumps(stage))
+    return tmp_path / "stage.json", tmp_path / "3frames.csv", stage
+
+
+def test_the_command_gives_a_rate_for_every_run(groundstation, files, tmp_path):
+    said = groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
+    lines = (tmp_path / "rates.csv").read_text().splitlines()
+    assert lines[0] == "run,wx,wy,wz"
+    assert len(lines) == 4
+    assert np.degrees([float(x) for x in lines[1].split(",")[1:]]) == pytest.approx([-2.5, 1, 1], abs=1.5)
+    assert "published M, D, sigma" in said.output
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"Ix": 40000.0}, "of no body"),
+        ({"markers_m": [[0, 0, 0]]}, "markers_m"),
+        ({"camera": "somewhere"}, "camera must tell"),
+        ({"f_px": 0}, "f_px"),
+        ({"sigma_px": {"3frames": "much"}}, "sigma_px.3frames"),
+    ],
+    ids=str,
+)
+def test_a_stage_that_is_wrong_is_refused(groundstation, files, tmp_path, change, words):
+    files[0].write_text(json.dumps(files[2] | change))
+    with pytest.raises(FileError, match=words):
+        groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
+    assert not (tmp_path / "rates.csv").exists()
+
+
+def test_a_run_of_one_frame_is_refused(groundstation, files, tmp_path):
+    text = files[1].read_text() + "".join(f"7,0,{k},1,{k}\n" for k in range(6))
+    files[1].write_text(text)
+    with pytest.raises(FileError, match="run 7"):
+        groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
