@@ -10,23 +10,27 @@ import numpy as np
 from calibration.guided_steps import GuidedSteps
 from calibration.live_curve import LiveCurve
 from calibration.manoeuvres import tour
-from calibration.motion_capture.alignment import Alignment, Array, Pairs, align, residuals
+from calibration.motion_capture.alignment import Alignment, Array, align, residuals
+from calibration.motion_capture.rigs_alignment import (
+    AXES,
+    RigsAlignment,
+    heading_drawing,
+    places_drawing,
+    rms_quantities,
+)
 from calibration.motion_capture.seen_by_both import SeenByBoth, pairs_of
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
 from groundstation.declarations.fix import PoseFix
-from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step, Wish
+from groundstation.declarations.guide import Advice, Drawing, Goal, Step, Wish
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
-from groundstation.frames import wrap_angle
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.motion_capture.capture_frame import CaptureFrame
 from groundstation.parts.motion_capture.messages import CapturedPose
 from groundstation.parts.motion_capture.sections import (
-    CapturedBodySection,
     MotionCaptureOfRig,
     MotionCaptureOfVehicle,
-    MotionCaptureSection,
 )
 from groundstation.parts.overhead.messages import OverheadFix
 from groundstation.parts.reference.messages import ReferenceState
@@ -70,7 +74,6 @@ SOURCES: Mapping[str, type[Message]] = {
     "reference": ReferenceState,
 }
 """What the system can be laid beside, the best first."""
-AXES = (("x", 1e3, "mm"), ("y", 1e3, "mm"), ("heading", math.degrees(1.0), "deg"))
 
 
 class GuidedAlignment:
@@ -84,8 +87,9 @@ class GuidedAlignment:
 
     def __init__(self, rig: Rig, vehicle: str, source: str) -> None:
         self._vehicle, self._source = vehicle, source
-        self._system, self._body = _sections(rig, vehicle)
-        self._body_name = self._body.body or vehicle
+        self._rigs = RigsAlignment.of(rig, vehicle)
+        self._system = self._rigs.system
+        self._body_name = self._rigs.body.body or vehicle
         self._flat = CaptureFrame(self._system.up, (0.0, 0.0, 0.0), 0.0)
         self.kinds: tuple[type[Message], ...] = (CapturedPose, SOURCES[source], *GuidedSteps.kinds)
         manoeuvres = {"move": tour, CHECK: tour}
@@ -183,19 +187,19 @@ class GuidedAlignment:
         """
         fitted = pairs_of(self._fitted)
         found = align(fitted)
-        quantities = self._quantities(found)
+        quantities = self._rigs.quantities(found)
         verification, warnings, drawings = self._verified(found.value)
         left = np.sqrt((residuals(found.value, fitted) ** 2).mean(axis=0))
         return Outcome(
             title=f"Motion capture beside {self._source}, {self._vehicle}",
-            summary="\n".join([*quantity_lines(quantities), *self._lines(found.value)]),
+            summary="\n".join([*quantity_lines(quantities), *self._rigs.lines(found.value)]),
             quantities=quantities,
-            residual=_rms_quantities(left),
+            residual=rms_quantities(left),
             notes={
                 "source": self._source,
                 "poses": len(fitted),
                 "chi_square_ratio": found.chi_square_ratio,
-                "rig": self._lines(found.value),
+                "rig": self._rigs.lines(found.value),
                 **{f"step_{step}": outcome for step, outcome in self.outcomes.items()},
             },
             warnings=warnings,
@@ -219,7 +223,7 @@ class GuidedAlignment:
         self._both.add_seen(exposure_ns, np.array([pose.x_m, pose.y_m, pose.heading_rad]))
 
     def _draw(self, row: Array, stamp_ns: int) -> None:
-        value = self._value() if self._now is None else self._now.value
+        value = self._rigs.value() if self._now is None else self._now.value
         one = pairs_of([row])
         off = residuals(value, one)[0]
         self._places[0].add(float(row[3]), float(row[4]))
@@ -244,53 +248,15 @@ class GuidedAlignment:
             "pivot_sigma_m": max(sigma[3], sigma[4]),
         }
 
-    def _value(self) -> Array:
-        """As the rig has it."""
-        x_m, y_m, _ = self._system.origin_table_m
-        return np.array(
-            [
-                x_m,
-                y_m,
-                math.radians(self._system.yaw_deg),
-                *self._body.pivot_body_m,
-                math.radians(self._body.pivot_yaw_deg),
-                0.0,
-            ]
-        )
-
-    def _quantities(self, found: Alignment) -> dict[str, Quantity]:
-        value, sigma = found.value.tolist(), found.sigma.tolist()
-        turn = math.degrees(1.0)
-        return {
-            "origin_table_x": Quantity(value[0], sigma[0], "m"),
-            "origin_table_y": Quantity(value[1], sigma[1], "m"),
-            "yaw": Quantity(turn * wrap_angle(value[2]), turn * sigma[2], "deg"),
-            "pivot_body_x": Quantity(value[3], sigma[3], "m"),
-            "pivot_body_y": Quantity(value[4], sigma[4], "m"),
-            "pivot_yaw": Quantity(turn * wrap_angle(value[5]), turn * sigma[5], "deg"),
-            "delay": Quantity(self._system.delay_s + value[6], sigma[6], "s"),
-        }
-
-    def _lines(self, value: Array) -> list[str]:
-        """What belongs into the rig file."""
-        z_m, turn = self._system.origin_table_m[2], math.degrees(1.0)
-        return [
-            f"[motion_capture] origin_table_m = [{value[0]:.5f}, {value[1]:.5f}, {z_m:g}]",
-            f"[motion_capture] yaw_deg = {turn * wrap_angle(value[2]):.4f}",
-            f"[motion_capture] delay_s = {max(0.0, self._system.delay_s + value[6]):.4f}",
-            f"[vehicles.{self._vehicle}] motion_capture.pivot_body_m = [{value[3]:.5f}, {value[4]:.5f}]",
-            f"[vehicles.{self._vehicle}] motion_capture.pivot_yaw_deg = {turn * wrap_angle(value[5]):.4f}",
-        ]
-
     def _verified(self, value: Array) -> tuple[dict[str, Quantity], tuple[str, ...], tuple[Drawing, ...]]:
         if not self._checked:
             return {}, ("it is not verified: nothing was seen by both after the fit",), ()
         pairs = pairs_of(self._checked)
-        after, before = residuals(value, pairs), residuals(self._value(), pairs)
-        numbers = _rms_quantities(np.sqrt((after**2).mean(axis=0)))
+        after, before = residuals(value, pairs), residuals(self._rigs.value(), pairs)
+        numbers = rms_quantities(np.sqrt((after**2).mean(axis=0)))
         numbers |= {
             f"{name}_as_the_rig_has_it": number
-            for name, number in _rms_quantities(np.sqrt((before**2).mean(axis=0))).items()
+            for name, number in rms_quantities(np.sqrt((before**2).mean(axis=0))).items()
         }
         ratio = float(((after / pairs.sigma[:, [0, 0, 1]]) ** 2).mean())
         numbers["chi_square_ratio"] = Quantity(ratio, math.sqrt(2.0 / after.size), "1")
@@ -302,45 +268,8 @@ class GuidedAlignment:
         return (
             numbers,
             warnings,
-            (_places_drawing(pairs, before, after), _heading_drawing(pairs, before, after)),
+            (places_drawing(before, after), heading_drawing(pairs, before, after)),
         )
-
-
-def _sections(rig: Rig, vehicle: str) -> tuple[MotionCaptureSection, CapturedBodySection]:
-    system = rig.section(MotionCaptureOfRig).motion_capture
-    body = rig.vehicle(vehicle, MotionCaptureOfVehicle).motion_capture
-    assert system is not None
-    assert body is not None
-    return system, body
-
-
-def _rms_quantities(rms: Array) -> dict[str, Quantity]:
-    return {
-        name: Quantity(float(each), math.nan, "rad" if name == "heading" else "m")
-        for (name, _, _), each in zip(AXES, rms, strict=True)
-    }
-
-
-def _places_drawing(pairs: Pairs, before: Array, after: Array) -> Drawing:
-    rows: tuple[tuple[str, Array, Mark], ...] = (
-        ("as the rig has it", before, "refused"),
-        ("aligned", after, "dots"),
-    )
-    curves = [
-        Curve(name, (1e3 * off[:, 0]).tolist(), (1e3 * off[:, 1]).tolist(), mark) for name, off, mark in rows
-    ]
-    del pairs
-    return Drawing("Poses set aside: how far off the place", "x, mm", "y, mm", curves, is_to_scale=True)
-
-
-def _heading_drawing(pairs: Pairs, before: Array, after: Array) -> Drawing:
-    heading = np.degrees(pairs.pose[:, 2]).tolist()
-    rows: tuple[tuple[str, Array, Mark], ...] = (
-        ("as the rig has it", before, "refused"),
-        ("aligned", after, "dots"),
-    )
-    curves = [Curve(name, heading, np.degrees(off[:, 2]).tolist(), mark) for name, off, mark in rows]
-    return Drawing("Poses set aside: how far off the heading", "heading, deg", "off, deg", curves)
 
 
 class AlignmentWizard:

@@ -60,6 +60,9 @@ def test_it_is_followed_judged_and_accepted(opened, served, tmp_path, size, sche
     page.screenshot(path=tmp_path / f"result_{size}.png")
     assert not (tmp_path / "calibrations").exists()
     assert not page.evaluate("document.documentElement.scrollWidth > innerWidth + 1")
+    axe = pytest.importorskip("axe_core_python.sync_playwright")
+    found = axe.Axe().run(page)["violations"]
+    assert not [row["id"] for row in found if row["impact"] in ("serious", "critical")]
     page.get_by_role("button", name="Accept").click()
     page.wait_for_function(HEADING % "Accepted", timeout=20 * S)
     (path,) = (tmp_path / "calibrations").glob("alpha_mean_*.toml")
