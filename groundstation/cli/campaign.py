@@ -14,7 +14,7 @@ from groundstation.campaign.plan import Plan, parse_sweep
 from groundstation.campaign.running import Means, paths_of, run_campaign
 from groundstation.campaign.statistics import passed_of, wilson
 from groundstation.cli.run_progress import RunProgress
-from groundstation.recording.writer import check_new_recording
+from groundstation.recording.disk_file import check_new_recording
 from groundstation.scenario.loading import load
 from groundstation.scenario.running import fly_recorded, longest_s
 

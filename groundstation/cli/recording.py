@@ -1,4 +1,4 @@
-"""``groundstation recording``: look into a recording, recover a torn one."""
+"""``groundstation recording``: look into a recording, draw and cut it, recover a torn one."""
 
 import tomllib
 from datetime import UTC, datetime, timedelta
@@ -10,28 +10,43 @@ from rich.console import Console
 from rich.table import Table
 
 from groundstation.bus.envelope import Cause
-from groundstation.cli import recording_export, recording_pictures
+from groundstation.cli import (
+    recording_compare,
+    recording_cut,
+    recording_export,
+    recording_film,
+    recording_pictures,
+    recording_plot,
+)
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.causes import CauseIndex
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover as recover_file
-from groundstation.recording.writer import PART_SUFFIX
+from groundstation.recording.run_files import PART_SUFFIX
+from groundstation.watch.run_folder import kept_words
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.command()(recording_pictures.pictures)
 app.command()(recording_export.export)
+app.command()(recording_plot.plot)
+app.command()(recording_compare.compare)
+app.command()(recording_cut.cut)
+app.command()(recording_film.film)
 
 
 @app.callback()
 def recording() -> None:
-    """Look into recordings, recover a torn one."""
+    """Look into recordings: tables, plots, films, comparisons, cuts; recover a torn one."""
 
 
 @app.command()
-def info(file: Annotated[Path, typer.Argument(help="Recording (.mcap).")]) -> None:
-    """Say what a recording holds: where it comes from, and every topic with its rate."""
+def info(file: Annotated[Path, typer.Argument(help="Recording (.mcap), or the folder of a run.")]) -> None:
+    """Say what a recording holds: where it comes from, and every topic with its rate.
+
+    Example: groundstation recording info recordings/2026-03-01_14-05-00_two_mock_ups
+    """
     try:
         with Recording(file) as found:
             _print_info(found)
@@ -44,7 +59,10 @@ def recover(
     file: Annotated[Path, typer.Argument(help="Torn recording, usually ….mcap.part; it is left as it is.")],
     out: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
 ) -> None:
-    """Bring everything readable of a torn recording into a new one."""
+    """Bring everything readable of a torn or damaged recording into a new one.
+
+    Example: groundstation recording recover recordings/2026-03-01_14-05-00_two_mock_ups/recording.mcap.part
+    """
     target = out or _recovered_name(file)
     try:
         found = recover_file(file, target)
@@ -110,8 +128,12 @@ def _print_info(found: Recording) -> None:
     span_s = (found.stop_ns - found.start_ns) * 1e-9
     reported = found.info
     count = sum(channel.count for channel in found.channels)
-    size_mb = found.path.stat().st_size / 1e6
+    size_mb = sum(path.stat().st_size for path in found.files) / 1e6
     print(f"{found.path}: {span_s:.1f} s, {count} messages, {size_mb:.2f} MB")
+    if found.path.is_dir():
+        print(f"recordings: {', '.join(path.name for path in found.files)}")
+        for line in kept_words(found.path):
+            print(line)
     print(
         f"rig: {_rig_name(reported)}; images: {reported.images.value}; by: {reported.software or 'unknown'}"
     )

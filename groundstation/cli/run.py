@@ -2,7 +2,6 @@
 
 import json
 import sys
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -18,14 +17,14 @@ from groundstation.cli.console_option import (
     attendants,
 )
 from groundstation.cli.live_view import run_live
-from groundstation.cli.run_files import check_recording, finished_files
+from groundstation.cli.run_files import check_recording, finish_folder, finished_files, kept_in
 from groundstation.cli.run_progress import RunProgress
 from groundstation.core.library import default_core
 from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.files.writing import check_folder
 from groundstation.launch.live_run import LiveRun
 from groundstation.launch.lockstep_run import run_lockstep
-from groundstation.recording.writer import check_new_recording
+from groundstation.recording.disk_file import check_new_recording
 from groundstation.rig.read import parse_rig, read_text
 from groundstation.scenario.loading import made
 from groundstation.scenario.scenario_file import WHAT, content_of, is_scenario
@@ -46,7 +45,10 @@ def run(
     ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Write lines instead of a view.")] = False,
     report: Annotated[Path | None, typer.Option(help="Folder for report.html and report.json.")] = None,
-    record: Annotated[Path | None, typer.Option(help="Recording to write (.mcap).")] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Recording to write (.mcap). Default: a folder of this run in recordings/."),
+    ] = None,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="Virtual time, as fast as the CPU allows; needs --duration.")
     ] = False,
@@ -73,6 +75,9 @@ def run(
 
     On a terminal the space bar stops all vehicles, l lands them, q ends the run. A web console is started
     besides, and its address printed.
+
+    Without --record the run has a folder: recording, rig, scenario, calibrations, versions, notes and
+    report.json.
 
     Exit code 0; 1 where a fault landed a vehicle, or the recording could not be written to the end; 2 where
     the rig is wrong. What a person stops or lands is no fault. Of a scenario: 0 where all its limits held, 1
@@ -106,7 +111,9 @@ def run(
             no_console=no_console,
             scenario=(json.dumps(content), file.resolve()),
         )  # fmt: skip
-        asked = Asked(lockstep, headless, seed, record, report, compare, hardware, i_know, tuple(beside))
+        asked = Asked(
+            lockstep, headless, seed, record, report, compare, hardware, i_know, text, tuple(beside)
+        )
         raise typer.Exit(run_scenario(scenario, asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
@@ -115,8 +122,6 @@ def run(
         check_new_recording(record)
     if report is not None:
         check_folder(report)
-    stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
-    recording = record or loaded.record.directory / f"{stamp}.mcap"
     if lockstep:
         if hub_port:
             raise UsageError("--hub-port goes with real time: in virtual time nobody comes from outside")
@@ -125,20 +130,23 @@ def run(
     elif seed is not None:
         raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
     trouble = ""
-    try:
-        if lockstep:
-            assert duration is not None
-            with RunProgress(duration) as update:
-                faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
-        else:
-            beside = attendants(console_host, console_port, console_certificates, no_console=no_console)
-            live = LiveRun(loaded, text, file, recording, hub_port=hub_port, attendants=beside)
-            run_live(live, duration, headless=headless or not sys.stdout.isatty())
-            faults, trouble = live.faults, live.launcher.recording_trouble
-    finally:
-        finished, torn = finished_files(recording)
-    for line in faults.lines():
-        print(line)
+    with kept_in(record, loaded, text, loaded.name or file.stem) as (recording, folder):
+        try:
+            if lockstep:
+                assert duration is not None
+                with RunProgress(duration) as update:
+                    faults = run_lockstep(loaded, text, file, recording, duration, seed, update)
+            else:
+                beside = attendants(console_host, console_port, console_certificates, no_console=no_console)
+                live = LiveRun(loaded, text, file, recording, hub_port=hub_port, attendants=beside)
+                run_live(live, duration, headless=headless or not sys.stdout.isatty())
+                faults, trouble = live.faults, live.launcher.recording_trouble
+        finally:
+            finished, torn = finished_files(recording)
+        for line in faults.lines():
+            print(line)
+        if finished:
+            finish_folder(folder)
     if trouble or (torn and not finished):
         raise GroundStationError(trouble or f"no recording was finished: {torn[0]} is what is left")
     if report is not None:
@@ -146,6 +154,6 @@ def run(
             raise GroundStationError("there is no report: no recording was finished")
         from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
 
-        print_report(finished[-1], report, compare=compare)
+        print_report(finished[-1] if folder is None else folder.path, report, compare=compare)
     if faults.brought_down:
         raise typer.Exit(LANDED_BY_FAULT)

@@ -1,22 +1,21 @@
 """A scenario as ``groundstation run`` flies it: live, in lockstep, on hardware; then the verdict."""
 
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.record_stream import Recorded
 from groundstation.cli.live_view import run_live
-from groundstation.cli.run_files import finished_files
+from groundstation.cli.run_files import finish_folder, finished_files, kept_in
 from groundstation.cli.run_progress import RunProgress
 from groundstation.declarations.errors import GroundStationError, NodeError, RigError, UsageError
 from groundstation.files.writing import check_folder
 from groundstation.launch.attendant import Attendant
 from groundstation.launch.live_run import LiveRun
 from groundstation.parts.scenario.messages import FAILED, RUNNING, WAITING, Marker, ScenarioStatus
+from groundstation.recording.disk_file import check_new_recording
 from groundstation.recording.errors import RecordingError
-from groundstation.recording.writer import check_new_recording
 from groundstation.rig.read import load_rig, source_of
 from groundstation.scenario.judging import Judged, sentence
 from groundstation.scenario.loading import Scenario, rig_text
@@ -40,6 +39,8 @@ class Asked:
     compare: Path | None
     hardware: Path | None
     i_know: str | None
+    text: str
+    """Of the scenario's file."""
     attendants: tuple[Attendant, ...] = ()
 
 
@@ -65,10 +66,8 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
     else:
         check_failures(scenario)
         check_dispersions(scenario)
-    stamp = time.strftime("%Y-%m-%d_%H-%M-%S")
-    recording = asked.record or scenario.rig.record.directory / f"{stamp}.mcap"
     try:
-        judged = _flown(scenario, asked, seed, recording)
+        judged = _flown(scenario, asked, seed)
     except UsageError:
         raise
     except KeyboardInterrupt:
@@ -100,28 +99,33 @@ def _on_hardware(scenario: Scenario, asked: Asked, path: Path) -> Scenario:
     return on_hardware.remarked(f"flown although {refusal}: {asked.i_know}")
 
 
-def _flown(scenario: Scenario, asked: Asked, seed: int, recording: Path) -> Judged:
+def _flown(scenario: Scenario, asked: Asked, seed: int) -> Judged:
     trouble = ""
-    try:
-        if asked.lockstep:
-            with RunProgress(longest_s(scenario)) as progress:
-                judged, faults = fly_recorded(scenario, seed, recording, progress)
-        else:
-            if scenario.rig.laboratory is not None:
-                scenario = scenario.vary({"laboratory.seed": seed})
-            judged, faults, trouble = None, None, _fly_live(scenario, asked, recording)
-    finally:
-        finished, _ = finished_files(recording)
-    if judged is None:
-        judged = judge_recordings(scenario, finished)
-    for line in faults.lines() if faults is not None else ():
-        print(line)
+    if not asked.lockstep and scenario.rig.laboratory is not None:
+        scenario = scenario.vary({"laboratory.seed": seed})
+    kept = kept_in(asked.record, scenario.rig, rig_text(scenario.rig), scenario.name, asked.text)
+    with kept as (recording, folder):
+        try:
+            if asked.lockstep:
+                with RunProgress(longest_s(scenario)) as progress:
+                    judged, faults = fly_recorded(scenario, seed, recording, progress)
+            else:
+                judged, faults, trouble = None, None, _fly_live(scenario, asked, recording)
+        finally:
+            finished, _ = finished_files(recording)
+        if judged is None:
+            judged = judge_recordings(scenario, finished)
+        for line in faults.lines() if faults is not None else ():
+            print(line)
+        if finished:
+            finish_folder(folder, judged.verdict)
     if trouble:
         raise GroundStationError(trouble)
     if asked.report is not None and finished:
         from groundstation.cli.report import print_report  # matplotlib: half a second that a start has not
 
-        print_report(finished[-1], asked.report, verdict=judged.verdict, compare=asked.compare)
+        recorded = finished[-1] if folder is None else folder.path
+        print_report(recorded, asked.report, verdict=judged.verdict, compare=asked.compare)
     return judged
 
 

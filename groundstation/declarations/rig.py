@@ -148,11 +148,18 @@ class VehicleSection(Section):
     hold: HoldSection
 
 
+SplitLength = Annotated[float, Field(ge=1.0, allow_inf_nan=False)]
+
+
 class RecordSection(Section):
-    """Where recordings go, and what is kept of the camera's images."""
+    """Where recordings go, what is kept of the camera's images, and how long a file of a live run is.
+
+    ``split_s``: after this long another file goes on: ``recording_1.mcap``. Left out: one file.
+    """
 
     directory: Path = Path("recordings")
     images: Literal["off", "spots", "lossless"] = "spots"
+    split_s: SplitLength | None = None
 
 
 class NodeSection(Section):

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
@@ -14,15 +15,18 @@ from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.message import Message
 from groundstation.launch.orders import Orders
 from groundstation.launch.process import NICENESS, obey, stop_when_asked
-from groundstation.launch.recorder_pause import ALIVE_PERIOD_NS, SPARE_BYTES, Pause, next_name
+from groundstation.launch.recorder_pause import ALIVE_PERIOD_NS, SPARE_BYTES, Pause
 from groundstation.launch.recorder_reporter import RecorderReporter
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
+from groundstation.recording.run_files import next_name
 from groundstation.recording.writer import Recorder
 from groundstation.rig.provenance import recording_info
 from groundstation.rig.read import parse_rig
 
 TICK_S = 0.05
+FLUSH_PERIOD_NS = 150_000_000
+"""With the batches that are still on their way, a recorder that is killed loses 0.3 s at most."""
 
 
 def main(orders: Orders) -> None:
@@ -34,7 +38,7 @@ def run(orders: Orders) -> None:
     """Record until asked to stop; what is still in the queue then is written too.
 
     A disk that is full ends a file, not the process: the flight is told, and recording goes on in another
-    file when there is room again.
+    file when there is room again. Where the rig splits recordings, another file goes on without a gap.
 
     Raises:
         UsageError: The file cannot be begun.
@@ -44,38 +48,85 @@ def run(orders: Orders) -> None:
     os.nice(NICENESS)
     rig = parse_rig(orders.rig_text, orders.rig_path, orders.files)
     info = recording_info(rig, orders.rig_text, orders.rig_path, None, orders.utc_offset_ns)
+    begin = partial(begin_file, info, rig.tables.payloads)
+    split_ns = None if rig.record.split_s is None else round(rig.record.split_s * 1e9)
     batches: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
     stop_when_asked(lambda: batches.put(None))
     with ZenohBus(orders.endpoint) as bus:  # first: without a hub no file is begun
-        recorder = _begin(next_name(orders.recording) if orders.restarts else orders.recording, info)
+        try:
+            recorder = begin(next_name(orders.recording) if orders.restarts else orders.recording)
+        except RecordingError as error:
+            raise UsageError(str(error)) from error
         reporter = RecorderReporter(recorder, bus, orders.process, orders.sequences_after)
         bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
         reporter.look(time.monotonic_ns())
         bus.announce(orders.process)
         trouble = ""
-        while True:
-            is_over = False
+        is_over = False
+        while not is_over:
+            until_ns = None if split_ns is None else time.monotonic_ns() + split_ns
             try:
                 with in_a_sentence(recorder):
-                    write_until_end(recorder, batches, bus, orders.process, rig.tables.payloads, reporter)
-                    is_over = True
-                    recorder.finish()
-                break
+                    is_over = write_until_end(
+                        recorder, batches, bus, orders.process, rig.tables.payloads, reporter, until_ns
+                    )
+                    following = None if is_over else begin(next_name(orders.recording), recorder)
+                    _finish(recorder, following)
             except GroundStationError as error:
-                pause, reason = Pause(recorder, orders.recording, info), str(error)
-            sys.stderr.write(f"{reason} {pause.words()}\n")
-            sys.stderr.flush()
-            reporter.stall()
-            following = None if is_over else pause.wait(batches, bus, orders.process, reporter)
-            trouble = f"{reason} {pause.words()}"  # it may have become whole meanwhile
+                reason = str(error)
+                pause = Pause(recorder, orders.recording, begin)
+                _complain(f"{reason} {pause.words()}")
+                reporter.stall()
+                following = None if is_over else pause.wait(batches, bus, orders.process, reporter)
+                trouble = f"{reason} {pause.words()}"  # it may have become whole meanwhile
+                if following is not None:
+                    _complain(f"recording goes on in {following.path}")
             if following is None:
                 break
             recorder = following
             reporter.go_on(recorder)
-            sys.stderr.write(f"recording goes on in {recorder.path}\n")
-            sys.stderr.flush()
         if trouble:
             raise GroundStationError(trouble)
+
+
+def begin_file(
+    info: RecordingInfo,
+    payloads: Mapping[str, type[Message]],
+    path: Path,
+    before: Recorder | None = None,
+) -> Recorder:
+    """Begin a recording now.
+
+    Args:
+        info: What it states about itself.
+        payloads: Payload classes by noun.
+        path: Of the finished file.
+        before: The recording that it goes on from: what was latched there stands at its beginning.
+
+    Raises:
+        RecordingError: It cannot be written.
+    """
+    now_ns = time.monotonic_ns()
+    recorder = Recorder(
+        path, info, flush_period_ns=FLUSH_PERIOD_NS, spare_bytes=SPARE_BYTES, begins_ns=now_ns
+    )
+    if before is not None:
+        recorder.record_batch(before.latched.values(), payloads)
+    return recorder
+
+
+def _finish(recorder: Recorder, following: Recorder | None) -> None:
+    try:
+        recorder.finish()
+    except BaseException:
+        if following is not None:
+            following.discard()
+        raise
+
+
+def _complain(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 @contextmanager
@@ -91,13 +142,6 @@ def in_a_sentence(recorder: Recorder) -> Iterator[None]:
         raise GroundStationError(f"{error} (after {recorder.message_count} messages).") from error
 
 
-def _begin(path: Path, info: RecordingInfo) -> Recorder:
-    try:
-        return Recorder(path, info, spare_bytes=SPARE_BYTES)
-    except RecordingError as error:
-        raise UsageError(str(error)) from error
-
-
 def write_until_end(
     recorder: Recorder,
     batches: "queue.SimpleQueue[bytes | None]",
@@ -105,8 +149,21 @@ def write_until_end(
     process: str,
     payloads: Mapping[str, type[Message]],
     reporter: RecorderReporter | None = None,
-) -> None:
+    until_ns: int | None = None,
+) -> bool:
     """Write until the queue holds None.
+
+    Args:
+        recorder: Writes the file.
+        batches: Of the record streams, as they come.
+        bus: Takes its signs of life.
+        process: Its own name.
+        payloads: Payload classes by noun.
+        reporter: Reports of it.
+        until_ns: Or until this moment of the monotonic clock.
+
+    Returns:
+        Whether the queue held None.
 
     Raises:
         RecordingError: The disk is full, or gone; with a reporter while there is room to finish the file.
@@ -114,6 +171,9 @@ def write_until_end(
     sign_due_ns = 0
     while True:
         now_ns = time.monotonic_ns()
+        recorder.tick(now_ns)
+        if until_ns is not None and now_ns >= until_ns:
+            return False
         if now_ns >= sign_due_ns:  # an empty batch is its sign of life
             sign_due_ns = now_ns + ALIVE_PERIOD_NS
             bus.publish_batch(process, RecordWriter().take())
@@ -124,10 +184,9 @@ def write_until_end(
         try:
             batch = batches.get(timeout=TICK_S)
         except queue.Empty:
-            recorder.tick(time.monotonic_ns())
             continue
         if batch is None:
-            return
+            return True
         try:
             entries = read_batch(batch)
         except BatchError as error:

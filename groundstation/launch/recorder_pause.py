@@ -9,9 +9,10 @@ from pathlib import Path
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.launch.recorder_reporter import RecorderReporter
+from groundstation.recording.disk_file import free_bytes
 from groundstation.recording.errors import RecordingError
-from groundstation.recording.info import RecordingInfo
-from groundstation.recording.writer import PART_SUFFIX, Recorder, free_bytes
+from groundstation.recording.run_files import next_name
+from groundstation.recording.writer import Recorder
 
 ALIVE_PERIOD_NS = 1_000_000_000
 SPARE_BYTES = 1 << 20
@@ -28,7 +29,7 @@ class Pause:
     Args:
         recorder: Of the file that cannot be written any further; it is finished as soon as that is possible.
         first: First file of the run: the names of others are made from it.
-        info: What recordings state about themselves.
+        begin: Begins a recording of this name.
         free: Tells the free bytes on the disk of a file.
     """
 
@@ -36,18 +37,20 @@ class Pause:
         self,
         recorder: Recorder,
         first: Path,
-        info: RecordingInfo,
+        begin: Callable[[Path], Recorder],
         free: Callable[[Path], int] = free_bytes,
     ) -> None:
         self._recorder = recorder
         self._first = first
-        self._info = info
+        self._begin = begin
         self._free = free
         self._is_finished = False
         self._try_to_finish()
 
     def words(self) -> str:
         """What is there."""
+        if self._is_finished and not self._recorder.message_count:
+            return f"{self._recorder.path} is not begun"
         if self._is_finished:
             return f"{self._recorder.path} is complete up to here"
         return f"groundstation recording recover brings back what {self._recorder.part_path} holds"
@@ -87,7 +90,7 @@ class Pause:
         try:
             if self._free(self._first) < ROOM_AGAIN_BYTES:
                 return None
-            return Recorder(next_name(self._first), self._info, spare_bytes=SPARE_BYTES)
+            return self._begin(next_name(self._first))
         except RecordingError:
             return None  # it was said why
 
@@ -96,13 +99,3 @@ class Pause:
             with suppress(RecordingError):
                 self._recorder.end_early()
                 self._is_finished = True
-
-
-def next_name(first: Path) -> Path:
-    """A name beside the first file of a run that nobody has taken: nothing recorded is overwritten."""
-    number = 1
-    while True:
-        path = first.with_stem(f"{first.stem}_{number}")
-        if not (path.exists() or path.with_name(path.name + PART_SUFFIX).exists()):
-            return path
-        number += 1

@@ -11,7 +11,8 @@ from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.parts.operation.messages import RecorderStatus
-from groundstation.recording.writer import Recorder, free_bytes
+from groundstation.recording.disk_file import free_bytes
+from groundstation.recording.writer import Recorder
 
 PERIOD_NS = 500_000_000
 RATE_WINDOW_NS = 10_000_000_000

@@ -64,6 +64,7 @@ class McapFile:
         self._stamps_and_offsets: dict[int, list[int]] = {}  # of the open chunk, by channel
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
+        self._definitions: list[bytes] = []  # records of both, in the order of their coming
         self._metadata: list[MetadataIndex] = []
         self._chunks: list[bytes] = []  # their indexes, packed: an hour has fifteen thousand
         self._first_ns, self._last_ns = _NEVER_NS, 0
@@ -100,6 +101,15 @@ class McapFile:
         self._channels.append(channel)
         self._add(_packed(channel))
         return number
+
+    def repeat_definitions(self) -> None:
+        """Write every schema and channel once more, into the open chunk.
+
+        Readers without an index, of a file that was not finished, know the channels though the chunk that
+        named them first is lost.
+        """
+        self._parts += self._definitions
+        self._size += sum(map(len, self._definitions))
 
     def add_message(self, channel: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
         """Add a message to the open chunk; a chunk that is full is written."""
@@ -165,6 +175,7 @@ class McapFile:
 
     def _add(self, record: bytes) -> None:
         self._summary_bytes += len(record) + 16  # schemas and channels are in the summary once more
+        self._definitions.append(record)
         self._parts.append(record)
         self._size += len(record)
         if self._size > CHUNK_BYTES:

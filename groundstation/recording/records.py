@@ -31,13 +31,16 @@ class Opcode(IntEnum):
     """Kinds of records that are looked at; others are skipped."""
 
     HEADER = 0x01
+    FOOTER = 0x02
     SCHEMA = 0x03
     CHANNEL = 0x04
     MESSAGE = 0x05
     CHUNK = 0x06
     MESSAGE_INDEX = 0x07
     CHUNK_INDEX = 0x08
+    STATISTICS = 0x0B
     METADATA = 0x0C
+    METADATA_INDEX = 0x0D
     DATA_END = 0x0F
 
 
@@ -46,6 +49,7 @@ class DamagedChunkError(ValueError):
 
 
 _MESSAGE = Opcode.MESSAGE.value
+_MESSAGE_INDEX = Opcode.MESSAGE_INDEX.value
 
 
 class Record(NamedTuple):
@@ -129,12 +133,6 @@ def complete_records(data: bytes | mmap, position: int = 0) -> Iterator[Record]:
         yield Record(opcode, start, position)
 
 
-def read_chunk_start(content: bytes) -> int:
-    """Where a chunk begins, from the content of its record in the index."""
-    start: int = _U64.unpack_from(content, 16)[0]
-    return start
-
-
 def read_chunk(content: bytes) -> Chunk | None:
     """A chunk from the content of its record, which may be cut off; None if not even its head is there."""
     try:
@@ -172,34 +170,47 @@ def read_channel(content: bytes) -> Channel:
 def message_places(data: bytes, indexes: bytes, wanted: Container[int]) -> dict[int, list[int]]:
     """Where the message records of each channel begin in the records of a chunk.
 
+    The indexes are outside what the chunk's checksum covers: where they are not whole, records are walked.
+
     Args:
         data: The records.
         indexes: Index records of the chunk, one per channel; empty where there are none.
         wanted: Numbers of the channels.
-
-    Raises:
-        DamagedChunkError: An index points at something else.
     """
+    found = _indexed_places(data, indexes, wanted) if indexes else None
+    return _walked_places(data, wanted) if found is None else found
+
+
+def _walked_places(data: bytes, wanted: Container[int]) -> dict[int, list[int]]:
     found: dict[int, list[int]] = {}
-    if not indexes:
-        for opcode, start, _ in complete_records(data):
-            if opcode == _MESSAGE:
-                number = MESSAGE.unpack_from(data, start)[0]
-                if number in wanted:
-                    found.setdefault(number, []).append(start - RECORD.size)
-        return found
-    last = len(data) - RECORD.size - MESSAGE.size
-    for _, start, _ in complete_records(indexes):
+    for opcode, start, _ in complete_records(data):
+        if opcode == _MESSAGE:
+            number = MESSAGE.unpack_from(data, start)[0]
+            if number in wanted:
+                found.setdefault(number, []).append(start - RECORD.size)
+    return found
+
+
+def _indexed_places(data: bytes, indexes: bytes, wanted: Container[int]) -> dict[int, list[int]] | None:
+    """The same by the indexes; None where they are not what a writer makes of these records."""
+    found: dict[int, list[int]] = {}
+    last, stop = len(data) - RECORD.size - MESSAGE.size, 0
+    for opcode, start, stop in complete_records(indexes):
+        if opcode != _MESSAGE_INDEX or stop - start < _INDEX.size:
+            return None
         number, size = _INDEX.unpack_from(indexes, start)
+        if size != stop - start - _INDEX.size or size % 16:
+            return None
         if number not in wanted:
             continue
-        places = found[number] = list(
-            struct.unpack_from(f"<{size // 8}Q", indexes, start + _INDEX.size)[1::2]
-        )
+        places = list(struct.unpack_from(f"<{size // 8}Q", indexes, start + _INDEX.size)[1::2])
+        if number in found or sorted(set(places)) != places:
+            return None
         for place in places:
             if place > last or _START.unpack_from(data, place) != (_MESSAGE, number):
-                raise DamagedChunkError("the index of a chunk points at no message")
-    return found
+                return None
+        found[number] = places
+    return found if stop == len(indexes) else None
 
 
 def read_metadata(content: bytes) -> tuple[str, dict[str, str]]:

@@ -2,7 +2,9 @@
 
 The file is walked from the front. Complete chunks are unpacked; of the chunk at the torn end, the blocks
 that its compressor had finished are unpacked too. A damaged chunk is counted and skipped, and so are bytes
-that are no record, wherever they lie: behind them the next record is searched.
+that are no record, wherever they lie: behind them the next record is searched, and where the index at the end
+is whole, it says where the next chunk begins. Schemas and channels that stood in a damaged chunk are taken
+from their copies behind it.
 """
 
 import mmap
@@ -14,13 +16,14 @@ from pathlib import Path
 from typing import BinaryIO
 
 from groundstation.recording import records
+from groundstation.recording.disk_file import check_new_recording
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata, to_metadata
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
 from groundstation.recording.resync import Lost, walk
 from groundstation.recording.software import software
-from groundstation.recording.writer import check_new_recording
+from groundstation.recording.summary import summary_of
 
 
 @dataclass(slots=True)
@@ -79,13 +82,22 @@ def _mapped(file: BinaryIO, source: Path) -> mmap.mmap:
     return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
+def _listed_chunks(data: mmap.mmap) -> list[int]:
+    """Where the index at the end says that chunks begin; empty where there is none, or it is damaged."""
+    try:
+        return sorted(chunk.offset for chunk in summary_of(data).chunks)
+    except (RecordingError, ValueError, struct.error):
+        return []
+
+
 class _Copy:
     """Carries records over; numbers of schemas and channels are given anew."""
 
     def __init__(self, data: mmap.mmap, out: BinaryIO, source: Path) -> None:
         self._data = data
         is_mcap = data[: len(records.MAGIC)] == records.MAGIC
-        self._pieces = list(walk(data, len(records.MAGIC) if is_mcap else 0))
+        self._chunk_starts = _listed_chunks(data)
+        self._pieces = list(walk(data, len(records.MAGIC) if is_mcap else 0, self._chunk_starts))
         self._whole = [piece for piece in self._pieces if isinstance(piece, records.Record)]
         if not (is_mcap or self._whole):
             raise RecordingError(f"{source} is no MCAP file, or was torn before its first record")
@@ -96,7 +108,8 @@ class _Copy:
         self._writer = McapFile(out, profile, f"{software()} recover")
         self._found = Recovery()
         self._left_out = 0
-        self._chunk_starts: list[int] = []
+        self._ahead: list[records.Record] | None = None  # chunks behind, not looked through for channels yet
+        self._metadata: list[tuple[str, dict[str, str]]] = []
         self._newest_ns: int | None = None
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
@@ -108,8 +121,6 @@ class _Copy:
         for record in whole:  # an index at the end, if there is one, names channels of damaged chunks too
             if record.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
                 self._define(record.opcode, data[record.start : record.stop])
-            elif record.opcode == Opcode.CHUNK_INDEX:
-                self._chunk_starts.append(records.read_chunk_start(data[record.start : record.stop]))
         for piece in self._pieces:
             if isinstance(piece, Lost):
                 if piece.stop == len(data):
@@ -141,6 +152,9 @@ class _Copy:
         elif opcode == Opcode.METADATA:
             with suppress(ValueError, struct.error, RecordingError):
                 name, entries = records.read_metadata(content)
+                if (name, entries) in self._metadata:
+                    return  # its second copy
+                self._metadata.append((name, entries))
                 if name == GAPS_NAME:
                     self._found.gaps += from_metadata(entries)
                 else:
@@ -195,7 +209,7 @@ class _Copy:
         number, sequence, log_ns, publish_ns = records.MESSAGE.unpack_from(content)
         channel = self._new_channels.get(number)
         if channel is None:
-            known = self._channels.get(number)
+            known = self._channels.get(number) or self._look_ahead(number)
             if known is None:
                 self._found.orphans += 1
                 return
@@ -206,6 +220,20 @@ class _Copy:
         self._newest_ns = max(log_ns, self._newest_ns or 0)
         self._writer.add_message(channel, log_ns, content[records.MESSAGE.size :], publish_ns, sequence)
         self._found.messages += 1
+
+    def _look_ahead(self, number: int) -> records.Channel | None:
+        """A channel that no chunk so far names, from its copy behind; each chunk is looked through once."""
+        if self._ahead is None:
+            self._ahead = [record for record in reversed(self._whole) if record.opcode == Opcode.CHUNK]
+        while self._ahead and number not in self._channels:
+            record = self._ahead.pop()
+            with suppress(ValueError, struct.error):
+                chunk = records.read_chunk(self._data[record.start : record.stop])
+                inside = b"" if chunk is None else chunk.unpack()
+                for opcode, start, stop in records.complete_records(inside):
+                    if opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+                        self._define(opcode, inside[start:stop])
+        return self._channels.get(number)
 
     def _register(self, channel: records.Channel) -> int:
         schema = self._new_schemas.get(channel.schema, 0)

@@ -8,7 +8,8 @@ Source: MCAP specification, version 0.
 """
 
 import re
-from collections.abc import Iterator
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from mmap import mmap
 from struct import Struct
 from typing import NamedTuple
@@ -46,22 +47,38 @@ class Lost(NamedTuple):
     stop: int
 
 
-def walk(data: Data, position: int = 0) -> Iterator[Record | Lost]:
+def walk(data: Data, position: int = 0, listed: Sequence[int] = ()) -> Iterator[Record | Lost]:
     """Give every record from ``position`` on, and what lies between them.
 
     The magic bytes at the end belong to none. What is torn at the end is lost, too.
+
+    Args:
+        data: Of the file.
+        position: Where to begin.
+        listed: Where an index says that chunks begin, in order: no other record reaches across such a place.
     """
+    chunks = [start for start in listed if is_chunk_at(data, start)]
     end = len(data)
     while position < end:
         if end - position == len(MAGIC) and data[position:end] == MAGIC:
             return
+        place = bisect_left(chunks, position + 1)
+        limit = chunks[place] if place < len(chunks) else end
         record = _record_at(data, position)
+        if record is not None and record.stop > limit:
+            record = None
         if record is not None and (record.opcode != Opcode.MESSAGE or _is_followed(data, record.stop, 1)):
             yield record
             position = record.stop
             continue
-        start, position = position, _search(data, position + 1)
+        start, position = position, min(_search(data, position + 1), limit)
         yield Lost(start, position)
+
+
+def is_chunk_at(data: Data, start: int) -> bool:
+    """Whether a whole chunk record begins there."""
+    record = _record_at(data, start)
+    return record is not None and record.opcode == Opcode.CHUNK
 
 
 def _search(data: Data, position: int) -> int:

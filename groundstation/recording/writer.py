@@ -2,20 +2,20 @@
 
 Profile ``ros2``, schemas ``ros2msg``, messages ``cdr``. Messages gather in chunks that are closed after
 1 MiB or a quarter of a second, whichever comes first: what a killed recorder can lose is the open chunk,
-and the reader recovers the rest. The file is called ``….part`` until it is finished.
+and the reader recovers the rest. The file is called ``….part`` until it is finished. What the file states
+about itself stands in it twice, and its schemas and channels once more every ten seconds: a hole where they
+stood first costs no more than its chunk.
 
 Nothing here reads a clock, so that two equal runs in virtual time give equal bytes.
 """
 
 import contextlib
-import io
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from groundstation.bus.cdr import codec_of
 from groundstation.bus.envelope import Delivered, Envelope
@@ -23,18 +23,18 @@ from groundstation.bus.record_stream import Recorded
 from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.declarations.message import Message
 from groundstation.recording.channel_names import channel_name
+from groundstation.recording.disk_file import DiskFile, free_bytes, on_disk, open_new
 from groundstation.recording.errors import NoRoomError, RecordingError
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.policy import is_kept
+from groundstation.recording.run_files import part_of
 from groundstation.recording.software import software
 
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
-
-SUFFIX = ".mcap"
-PART_SUFFIX = ".part"
 FLUSH_PERIOD_NS = 250_000_000
+SECOND_COPY_NS = 1_000_000_000
+"""Of schemas and channels that are new, beside the one in the next chunk."""
+REPEAT_NS = 10_000_000_000
 MOST_RECENT = 256
 """Messages per topic among which one that comes again is looked for."""
 
@@ -42,12 +42,20 @@ MOST_RECENT = 256
 class Recorder:
     """Writes one recording. Use it as a context manager, from one thread.
 
+    Attributes:
+        path: Of the finished file.
+        part_path: Of the file until then.
+        message_count: Messages written or in the open chunk.
+        latched: The newest latched messages of the record stream, by noun and owner: a file that goes on from
+            here begins with them.
+
     Args:
         path: The finished file, e.g. ``run.mcap``; until then it is ``run.mcap.part``.
         info: What the recording states about itself.
         flush_period_ns: At most this much of log time is lost when the recorder is killed.
         durable: Also force each flush through to the disk, against loss of power.
         spare_bytes: Raise while so many bytes are left beside what finishing takes; 0: when none are.
+        begins_ns: Latched messages of the record stream that are older have this log time.
 
     Raises:
         RecordingError: The file, or what a killed recorder left of it, is already there, or it
@@ -62,23 +70,31 @@ class Recorder:
         flush_period_ns: int = FLUSH_PERIOD_NS,
         durable: bool = False,
         spare_bytes: int = 0,
+        begins_ns: int = 0,
     ) -> None:
         self.path = path
-        self.part_path = path.with_name(path.name + PART_SUFFIX)
+        self.part_path = part_of(path)
         self.message_count = 0
         self._images = info.images
         self._flush_period_ns = flush_period_ns
         self._durable = durable
         self._spare_bytes = spare_bytes
+        self._begins_ns = begins_ns
         self._flush_due_ns: int | None = None
         self._channels: dict[tuple[type[Message], str], int | None] = {}  # by class and owner
         self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
         self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
-        self._file: _File | None = _open_new(path, self.part_path)
+        self.latched: dict[tuple[str, str], Recorded] = {}
+        self._newest_ns = 0
+        self._has_new_channels = False
+        self._repeat_due_ns = 0
+        self._stated: dict[str, str] | None = info.to_metadata()
+        """What the file states about itself, until the second copy is written."""
+        self._file: DiskFile | None = open_new(path)
         try:
             self._writer = McapFile(self._file, profile="ros2", library=software())
-            self._writer.add_metadata(METADATA_NAME, info.to_metadata())
+            self._writer.add_metadata(METADATA_NAME, self._stated)
         except RecordingError:
             self.discard()  # nothing is in it that could be recovered
             raise
@@ -91,7 +107,10 @@ class Recorder:
     @property
     def rest_bytes(self) -> int:
         """At most so many bytes are still to be written if the recording is finished now."""
-        return 0 if self._file is None else self._writer.rest_bytes
+        if self._file is None:
+            return 0
+        stated = self._stated or {}
+        return self._writer.rest_bytes + sum(len(f"{key}{text}".encode()) + 8 for key, text in stated.items())
 
     def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
@@ -137,9 +156,13 @@ class Recorder:
                 continue
             if self._is_known(noun, owner, (publish_ns, sequence)):
                 continue
+            log_ns = publish_ns
+            if kind.TOPIC.latched:
+                self.latched[noun, owner] = message
+                log_ns = max(publish_ns, self._begins_ns)
             channel = self._channel(kind, owner)
             if channel is not None:
-                self._add(channel, sequence, publish_ns, message.data, publish_ns)
+                self._add(channel, sequence, publish_ns, message.data, log_ns)
         return unknown
 
     def _is_known(self, noun: str, owner: str, place: tuple[int, int]) -> bool:
@@ -159,6 +182,8 @@ class Recorder:
     def finish(self) -> Path:
         """Write the index and give the file its final name; may be called twice."""
         if self._file is not None:
+            self._writer.flush()
+            self._state_again()
             self._writer.finish()
             with on_disk(self.part_path):
                 os.fsync(self._file.fileno())
@@ -170,12 +195,18 @@ class Recorder:
     def end_early(self) -> int:
         """Finish without what a full disk has not taken; return how many messages that costs.
 
+        A recording in which there is no message leaves no file.
+
         Raises:
             RecordingError: Not even the index finds room; it may be tried again.
         """
         dropped = self._writer.drop_open_chunk()
         self.message_count -= dropped
-        self.finish()
+        self._stated = None  # room for the index is what matters
+        if self.message_count:
+            self.finish()
+        else:
+            self.discard()
         return dropped
 
     def discard(self) -> None:
@@ -197,6 +228,8 @@ class Recorder:
     def _add(self, channel: int, sequence: int, publish_ns: int, data: bytes, log_ns: int) -> None:
         self._writer.add_message(channel, log_ns, data, publish_ns, sequence)
         self.message_count += 1
+        if log_ns > self._newest_ns:
+            self._newest_ns = log_ns
         if self._flush_due_ns is None:
             self._flush_due_ns = log_ns + self._flush_period_ns
         elif log_ns >= self._flush_due_ns:
@@ -216,9 +249,22 @@ class Recorder:
         if self._spare_bytes:
             self.check_room(free_bytes(self.part_path))
         self._writer.flush()
+        if self._has_new_channels or self._newest_ns >= self._repeat_due_ns:
+            wait_ns = SECOND_COPY_NS if self._has_new_channels else REPEAT_NS
+            self._repeat_due_ns = self._newest_ns + wait_ns
+            if not self._has_new_channels:
+                self._state_again()
+            self._has_new_channels = False
+            self._writer.repeat_definitions()
         if self._durable and self._file is not None:
             with on_disk(self.part_path):
                 os.fsync(self._file.fileno())
+
+    def _state_again(self) -> None:
+        """Write the second copy of what the file states about itself, once, far behind the first."""
+        if self._stated is not None:
+            stated, self._stated = self._stated, None
+            self._writer.add_metadata(METADATA_NAME, stated)
 
     def _channel(self, kind: type[Message], owner: str) -> int | None:
         """Channel of a topic of an owner, registered at first use; None if the policy drops it."""
@@ -232,93 +278,10 @@ class Recorder:
         return channel
 
     def _register(self, kind: type[Message], owner: str) -> int:
+        self._has_new_channels = True
         noun = kind.TOPIC.noun
         schema = self._schemas.get(noun)
         if schema is None:
             text = schema_text(kind).encode()
             schema = self._schemas[noun] = self._writer.add_schema(kind.ROS_TYPE, ENCODING, text)
         return self._writer.add_channel(channel_name(noun, owner), "cdr", schema)
-
-
-def free_bytes(path: Path) -> int:
-    """On the disk of a file, for whoever is not root.
-
-    Raises:
-        RecordingError: Its folder is gone.
-    """
-    with on_disk(path):
-        found = os.statvfs(path.parent)
-    return found.f_bavail * found.f_frsize
-
-
-class _File(io.FileIO):
-    """A file that says in a sentence why it takes no more.
-
-    The next piece then stands where the one began that did not find room: what was written of it stays until
-    then, for whoever recovers the file.
-    """
-
-    _is_torn = False
-
-    def write(self, data: "ReadableBuffer", /) -> int:
-        left, start = memoryview(data), self.tell()
-        with on_disk(Path(str(self.name))):
-            try:
-                while left:
-                    left = left[self._put(left) :]
-                if self._is_torn:
-                    self.truncate()
-                    self._is_torn = False
-            except OSError:
-                self.seek(start)
-                self._is_torn = True
-                raise
-        return len(memoryview(data))
-
-    def _put(self, data: memoryview) -> int:
-        return super().write(data)
-
-
-@contextmanager
-def on_disk(path: Path) -> Iterator[None]:
-    """Write to a disk.
-
-    Raises:
-        RecordingError: It is full, or gone.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written any further: {error.strerror or error}") from error
-
-
-def check_new_recording(path: Path) -> None:
-    """Refuse a path to which no recording can be written, before any work is done.
-
-    Raises:
-        RecordingError: It does not end in ``.mcap``, is taken, too long, or lies behind a file.
-    """
-    if path.suffix != SUFFIX:
-        raise RecordingError(f"{path} must end in {SUFFIX}: that is how viewers and reports know recordings")
-    try:
-        if path.exists():
-            raise RecordingError(f"{path} is already there: recordings are never overwritten")
-        path.with_name(path.name + PART_SUFFIX).exists()
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written: {error.strerror}") from error
-    behind = next((parent for parent in path.parents if parent.exists()), path)
-    if not behind.is_dir():
-        raise RecordingError(f"{path} cannot be written: {behind} is no folder")
-
-
-def _open_new(path: Path, part_path: Path) -> _File:
-    check_new_recording(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if part_path.exists():
-            raise RecordingError(
-                f"{part_path} is left of a recording that was not finished: recover it or remove it first"
-            )
-        return _File(part_path, "x")
-    except OSError as error:
-        raise RecordingError(f"{part_path} cannot be written: {error.strerror}") from error

@@ -24,8 +24,8 @@ class FlownRun:
     """One run.
 
     Attributes:
-        name: Of the recording's file.
-        sha256: Of the recording's file.
+        name: Of the recording's file, or of the run's folder.
+        sha256: Of the recording's file, or of its files one after the other.
         duration_s: Of the recording.
         info: What the recording states about itself.
         missing: What a recovery left out of it, in sentences.
@@ -70,6 +70,10 @@ class FlownRun:
 def read_run(path: Path, tables: Tables) -> FlownRun:
     """Read a recording.
 
+    Args:
+        path: An ``.mcap`` file, or the folder of a run.
+        tables: Of the parts whose figures are wanted.
+
     Raises:
         UsageError: It holds no vehicle's state.
         RecordingError: It cannot be read.
@@ -78,13 +82,24 @@ def read_run(path: Path, tables: Tables) -> FlownRun:
     with Recording(path) as source:
         reports = read_reports(tables, source, TAKEN, log)
         duration_s = (source.stop_ns - source.start_ns) * 1e-9
-        info, missing = source.info, tuple(source.missing())
+        info, missing, files = source.info, tuple(source.missing()), source.files
     if not reports:
         raise UsageError(f"{path}: holds no vehicle state, so there is nothing to report")
-    with path.open("rb") as file:
-        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+    sha256 = hashlib.sha256()
+    for each in files:
+        with each.open("rb") as file:
+            hashlib.file_digest(file, lambda: sha256)
     rig = rig_facts(info.rig_toml)
-    return FlownRun(path.name, sha256, duration_s, info, missing, rig, reports, log.marks(duration_s))
+    return FlownRun(
+        path.name or path.resolve().name,
+        sha256.hexdigest(),
+        duration_s,
+        info,
+        missing,
+        rig,
+        reports,
+        log.marks(duration_s),
+    )
 
 
 def _first_flight(track: Track) -> float:

@@ -12,7 +12,7 @@ from groundstation.recording.software import software
 from groundstation.watch.flown_run import FlownRun, read_run
 from groundstation.watch.page.page import render_page
 from groundstation.watch.page.subject import Subject
-from groundstation.watch.run_events import with_verdict
+from groundstation.watch.run_events import Mark, with_verdict
 from groundstation.watch.verdict import Verdict
 
 Progress = Callable[[str, float], None]
@@ -52,9 +52,36 @@ def write_report(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with whole_folder(folder) as made:
         write_file(made / "report.html", page)
-        write_file(made / "report.json", json.dumps(_plain(_summary(subject)), indent=1) + "\n")
+        write_file(made / "report.json", _numbers(subject))
     progress("done", 1.0)
     return [folder / "report.json", folder / "report.html"]
+
+
+def numbers_of(
+    recording: Path, progress: Progress, verdict: Verdict | None = None
+) -> tuple[str, list[Mark], float]:
+    """Read a recording into the text of ``report.json`` alone: nothing is drawn.
+
+    Args:
+        recording: Of the run, or its folder.
+        progress: Takes what is being done, and the share that is done.
+        verdict: On the run, where a scenario was flown.
+
+    Returns:
+        The text, what happened (s since the recording began), and when the run's t = 0 was.
+
+    Raises:
+        UsageError: The recording holds no vehicle's state.
+        RecordingError: The recording cannot be read.
+    """
+    progress("reading the recording", 0.0)
+    subject = _subject(read_run(recording, installed_tables()), None, verdict)
+    progress("done", 1.0)
+    return _numbers(subject), subject.marks, subject.zero_s
+
+
+def _numbers(subject: Subject) -> str:
+    return json.dumps(_plain(_summary(subject)), indent=1) + "\n"
 
 
 def _subject(run: FlownRun, other: FlownRun | None, verdict: Verdict | None) -> Subject:

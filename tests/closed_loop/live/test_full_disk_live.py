@@ -11,7 +11,7 @@ import pytest
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
-from groundstation.recording.writer import PART_SUFFIX
+from groundstation.recording.run_files import PART_SUFFIX
 
 ROOT = Path(__file__).parents[3]
 RIG = ROOT / "examples" / "rigs" / "drawn_fixes.toml"

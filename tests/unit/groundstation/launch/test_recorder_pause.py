@@ -8,16 +8,21 @@ import queue
 import pytest
 
 from groundstation.launch.recorder import write_until_end
-from groundstation.launch.recorder_pause import ROOM_AGAIN_BYTES, SPARE_BYTES, Pause, next_name
+from groundstation.launch.recorder_pause import ROOM_AGAIN_BYTES, SPARE_BYTES, Pause
 from groundstation.launch.recorder_reporter import RecorderReporter
 from groundstation.parts.operation.messages import Latency
-from groundstation.recording import writer
+from groundstation.recording import disk_file, writer
 from groundstation.recording.errors import NoRoomError, RecordingError
 from groundstation.recording.reader import Recording
+from groundstation.recording.run_files import next_name
 from groundstation.recording.writer import Recorder
 from tests.unit.groundstation.launch.test_recorder_reporter import INFO, Bus, batch_of, record
 
 PAYLOADS = {"latency": Latency}
+
+
+def begin(path):
+    return Recorder(path, INFO, spare_bytes=SPARE_BYTES)
 
 
 class Disk:
@@ -26,7 +31,7 @@ class Disk:
     def __init__(self, monkeypatch, room):
         self.room = room
 
-        class File(writer._File):
+        class File(disk_file.DiskFile):
             def _put(file, data):  # noqa: N805
                 place, end = file.tell(), os.fstat(file.fileno()).st_size
                 fits = min(len(data), max(0, end + self.room - place))
@@ -36,7 +41,7 @@ class Disk:
                 self.room -= max(0, place + written - end)
                 return written
 
-        monkeypatch.setattr(writer, "_File", File)
+        monkeypatch.setattr(disk_file, "DiskFile", File)
 
 
 def sequences(path):
@@ -61,7 +66,7 @@ def test_what_a_full_disk_has_taken_is_whole_and_is_finished_when_there_is_room_
     disk = Disk(monkeypatch, room)
     recorder = Recorder(tmp_path / "run.mcap", INFO)
     given = fill(recorder)
-    pause = Pause(recorder, tmp_path / "run.mcap", INFO, free=lambda _path: disk.room)
+    pause = Pause(recorder, tmp_path / "run.mcap", begin, free=lambda _path: disk.room)
     if not pause.words().endswith("is complete up to here"):  # not even the index found room
         assert "recover brings back" in pause.words()
         assert pause.try_to_go_on() is None
@@ -100,7 +105,7 @@ def test_while_it_waits_it_is_alive_and_reports_no_room(tmp_path, monkeypatch):
     reporter.stall()
     for item in (batch_of(1), b"nonsense", batch_of(2)):
         waiting.put(item)
-    pause = Pause(recorder, tmp_path / "run.mcap", INFO, free=lambda _path: next(room))
+    pause = Pause(recorder, tmp_path / "run.mcap", begin, free=lambda _path: next(room))
     following = pause.wait(waiting, bus, "recorder", reporter)
     assert following.path == tmp_path / "run_1.mcap"
     assert bus.at_once[0][1].room_s == 0.0
@@ -117,9 +122,10 @@ def test_asked_to_end_it_ends_and_leaves_no_litter(tmp_path):
     recorder = Recorder(tmp_path / "run.mcap", INFO)
     waiting = queue.SimpleQueue()
     waiting.put(None)
-    pause = Pause(recorder, tmp_path / "run.mcap", INFO, free=lambda _path: 0)
+    pause = Pause(recorder, tmp_path / "run.mcap", begin, free=lambda _path: 0)
     assert pause.wait(waiting, Bus(), "recorder", RecorderReporter(recorder, Bus(), "recorder")) is None
-    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+    assert pause.words() == f"{tmp_path / 'run.mcap'} is not begun"
+    assert not list(tmp_path.iterdir()), "a recording without a message leaves no file"
 
 
 def test_a_name_that_is_taken_is_never_written_over(tmp_path):

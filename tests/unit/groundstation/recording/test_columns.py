@@ -13,6 +13,7 @@ from groundstation.parts.valves.messages import ValveCommand
 from groundstation.recording import columns
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
+from groundstation.recording.summary import read_summary
 
 RECORDED = Path(__file__).parents[3] / "replay" / "recordings" / "formation.mcap"
 WANTED = {
@@ -47,11 +48,32 @@ def test_a_file_with_another_layout_is_decoded_by_its_own_schema(monkeypatch):
         check(recording, columns.read_columns(recording, WANTED))
 
 
-def test_a_chunk_that_is_damaged_is_named(tmp_path):
-    path = tmp_path / "damaged.mcap"
+def with_a_hole(path, place, size=4096):
     data = bytearray(RECORDED.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 20_000] = bytes(20_000)  # longer than the indexes between two chunks
+    data[place : place + size] = bytes(size)
     path.write_bytes(data)
+    return path
+
+
+def chunk_in_the_middle():
+    with RECORDED.open("rb") as file:
+        chunks = read_summary(file.fileno(), RECORDED.stat().st_size).chunks
+    return chunks[len(chunks) // 2]
+
+
+def test_a_hole_in_the_indexes_between_two_chunks_costs_nothing(tmp_path):
+    chunk = chunk_in_the_middle()
+    begin = chunk.offset + chunk.length
+    for place in np.linspace(begin, begin + chunk.index_length - 64, 12).astype(int).tolist():
+        path = with_a_hole(tmp_path / "damaged.mcap", place, min(4096, begin + chunk.index_length - place))
+        with Recording(path) as recording:
+            check(recording, columns.read_columns(recording, WANTED))
+        with Recording(path) as damaged, Recording(RECORDED) as whole:
+            assert [m.data for m in damaged.messages(WANTED)] == [m.data for m in whole.messages(WANTED)]
+
+
+def test_a_chunk_that_is_damaged_is_named(tmp_path):
+    chunk = chunk_in_the_middle()
+    path = with_a_hole(tmp_path / "damaged.mcap", chunk.offset + chunk.length // 2)
     with Recording(path) as recording, pytest.raises(RecordingError, match=r"damaged\.mcap: .* try"):
         columns.read_columns(recording, WANTED)

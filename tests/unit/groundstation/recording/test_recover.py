@@ -172,8 +172,37 @@ def test_channels_named_in_a_damaged_chunk_are_found_in_the_index(tmp_path, whol
     assert report.damaged_chunks == 1
     assert report.orphans == 0  # the index at the end repeats the channels
     assert messages(target)
-    report, _ = recovered(tmp_path, bytes(broken[: chunk_ends(whole)[2]]))
-    assert report.orphans > 0  # without the index they are lost, and counted
+
+
+def test_channels_named_in_a_damaged_chunk_are_found_in_the_copies_behind_it(tmp_path, whole):
+    ends, spans = chunk_ends(whole), chunk_spans(whole)
+    broken = bytearray(whole)
+    broken[ends[0] - 40] ^= 0x10
+    report, target = recovered(tmp_path, bytes(broken[: ends[2]]))
+    assert (report.damaged_chunks, report.orphans) == (1, 0)
+    found, everything = messages(target), complete(whole)
+    behind = [m for m in everything if spans[0][1] < m[2] < spans[2][1]]
+    there = set(behind)
+    assert [m for m in found if m in there] == behind
+    assert set(found) <= set(everything)
+
+
+def test_channels_that_no_other_chunk_names_are_counted(tmp_path):
+    file = io.BytesIO()
+    writer = Writer(file)
+    writer.start(profile="ros2")
+    schema = writer.register_schema(ImuBytes.ROS_TYPE, ENCODING, schema_text(ImuBytes).encode())
+    channel = writer.register_channel("/alpha/imu_bytes", "cdr", schema)
+    for number in range(6):
+        writer.add_message(channel, number, bytes(50), number, number)
+        if number == 2:
+            writer.flush()
+            end = file.tell()
+    writer.flush()
+    broken = bytearray(file.getvalue())
+    broken[end - 150] ^= 0x10
+    report, _ = recovered(tmp_path, bytes(broken))
+    assert (report.damaged_chunks, report.orphans, report.messages) == (1, 3, 0)
 
 
 def test_zeros_that_a_power_cut_left_are_no_records(tmp_path, whole):
