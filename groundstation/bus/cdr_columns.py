@@ -83,6 +83,8 @@ def decode_columns(
     reader.pass_by(1)  # the name of the vehicle
     found: dict[str, NDArray[Any]] = {}
     for part in parts(kind):
+        if len(found) == len(names):
+            break
         if isinstance(part, Run):
             found |= reader.run(part, names)
         elif isinstance(part, Texts):
@@ -91,8 +93,6 @@ def decode_columns(
             found[part.name] = reader.padded(part)
         else:
             reader.pass_by(part.size if isinstance(part, Numbers) else 1)
-        if len(found) == len(names):
-            break
     return Columns(head["s"].astype(np.int64) * _NS + head["ns"], found)
 
 

@@ -117,7 +117,9 @@ class Recording:
         """What is not there: what a recovery left out, and files of the run that were not finished."""
         torn = run_of(self.path / FIRST_NAME)[1] if self.path.is_dir() else []
         unread = [
-            f"{path} was not finished and is not read: `groundstation recording recover`" for path in torn
+            f"{path} was not finished and is not read: `groundstation recording recover`"
+            for path in torn
+            if path.with_suffix("") not in self.files  # it has been recovered
         ]
         return [gap.sentence(self.start_ns) for gap in self.gaps] + unread
 
