@@ -14,7 +14,7 @@ from groundstation.watch.film import FilmPlan, write_film
 
 def film(
     file: Annotated[Path, typer.Argument(help="Recording (.mcap), or the folder of a run.")],
-    out: Annotated[Path, typer.Option(help="Film to write (.mp4, .webm, .avi).")],
+    out: Annotated[Path, typer.Option(help="Film to write (.mp4, .avi).")],
     from_s: Annotated[float, typer.Option(help="From here, s since the recording began.", min=0.0)] = 0.0,
     to_s: Annotated[float | None, typer.Option(help="To here; default: the end.", min=0.0)] = None,
     speed: Annotated[

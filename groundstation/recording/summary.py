@@ -94,15 +94,16 @@ class Summary:
             low_ns: Least log time.
             high_ns: Log times stay below.
         """
-        starts_ns, stops_ns = self._spans
-        by_channel = self._by_channel
-        lists = [by_channel[number] for number in channels if number in by_channel]
         if not channels:
             return []
-        places = np.unique(np.concatenate([self._unlisted, *lists]))
+        starts_ns, stops_ns = self._spans
+        by_channel, holds = self._by_channel, np.zeros(len(self.chunks), bool)
+        holds[self._unlisted] = True
+        for number in channels:
+            if number in by_channel:
+                holds[by_channel[number]] = True
         low, high = np.uint64(max(low_ns, 0)), np.uint64(min(max(high_ns, 0), (1 << 64) - 1))
-        wanted = (stops_ns[places] >= low) & (starts_ns[places] < high)
-        found: list[int] = places[wanted].tolist()
+        found: list[int] = np.flatnonzero(holds & (stops_ns >= low) & (starts_ns < high)).tolist()
         return found
 
     def last_chunks(self, channel: int, at_ns: int) -> Iterator[int]:

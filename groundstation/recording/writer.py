@@ -13,6 +13,7 @@ import contextlib
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -37,6 +38,21 @@ SECOND_COPY_NS = 1_000_000_000
 REPEAT_NS = 10_000_000_000
 MOST_RECENT = 256
 """Messages per topic among which one that comes again is looked for."""
+
+
+@dataclass(slots=True)
+class _Stream:
+    """What is known of one topic of one owner in the record stream.
+
+    Attributes:
+        is_latched: Whether late joiners receive its last message again.
+        channel: Of the file; None where the policy drops it.
+        recent: Moments and numbers of the newest messages.
+    """
+
+    is_latched: bool
+    channel: int | None
+    recent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=MOST_RECENT))
 
 
 class Recorder:
@@ -84,7 +100,7 @@ class Recorder:
         self._channels: dict[tuple[type[Message], str], int | None] = {}  # by class and owner
         self._encoders: dict[type[Message], Callable[[Message], bytes]] = {}
         self._schemas: dict[str, int] = {}
-        self._recent: dict[tuple[str, str], deque[tuple[int, int]]] = {}
+        self._streams: dict[tuple[str, str], _Stream] = {}  # by noun and owner
         self.latched: dict[tuple[str, str], Recorded] = {}
         self._newest_ns = 0
         self._has_new_channels = False
@@ -148,31 +164,28 @@ class Recorder:
             How many were none of these and are not written.
         """
         unknown = 0
+        streams, add = self._streams, self._add
         for message in messages:
             noun, owner, sequence, publish_ns = message[:4]
-            kind = payloads.get(noun)
-            if kind is None:
-                unknown += 1
+            stream = streams.get((noun, owner))
+            if stream is None:
+                kind = payloads.get(noun)
+                if kind is None:
+                    unknown += 1
+                    continue
+                stream = streams[noun, owner] = _Stream(kind.TOPIC.latched, self._channel(kind, owner))
+            place = publish_ns, sequence
+            recent = stream.recent
+            if recent and place <= recent[-1] and place in recent:
                 continue
-            if self._is_known(noun, owner, (publish_ns, sequence)):
-                continue
+            recent.append(place)
             log_ns = publish_ns
-            if kind.TOPIC.latched:
+            if stream.is_latched:
                 self.latched[noun, owner] = message
                 log_ns = max(publish_ns, self._begins_ns)
-            channel = self._channel(kind, owner)
-            if channel is not None:
-                self._add(channel, sequence, publish_ns, message.data, log_ns)
+            if stream.channel is not None:
+                add(stream.channel, sequence, publish_ns, message.data, log_ns)
         return unknown
-
-    def _is_known(self, noun: str, owner: str, place: tuple[int, int]) -> bool:
-        recent = self._recent.get((noun, owner))
-        if recent is None:
-            recent = self._recent[noun, owner] = deque(maxlen=MOST_RECENT)
-        elif place <= recent[-1] and place in recent:
-            return True
-        recent.append(place)
-        return False
 
     def tick(self, now_ns: int) -> None:
         """Time passed without a message: close the chunk if it is due. The clock is that of the log times."""

@@ -19,8 +19,8 @@ from groundstation.watch.table_picture import TablePicture
 
 Progress = Callable[[str, float], None]
 Picture = NDArray[np.uint8]
-CODECS: Final = {".mp4": ("avc1", "vp09", "mp4v"), ".webm": ("VP90", "VP80"), ".avi": ("XVID", "MJPG")}
-"""By the ending of the file, the best first: what OpenCV can write differs from build to build."""
+CODECS: Final = {".mp4": ("vp09", "mp4v"), ".avi": ("MJPG",)}
+"""By the ending of the file, the best first: browsers show vp09, every OpenCV writes MJPG."""
 
 
 @dataclass(frozen=True, slots=True)

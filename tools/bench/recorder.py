@@ -5,20 +5,21 @@ with its own session as in a run, and pictures of two star cameras. Lost is what
 recorder was ready and before it was asked to end, and is not in the file.
 """
 
+import heapq
 import itertools
 import multiprocessing
 import os
-import pickle
 import random
 import signal
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.context import ForkServerProcess
 from multiprocessing.synchronize import Event
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -31,41 +32,83 @@ from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.declarations.topic import Topic
+from groundstation.launch import recorder as recorder_process
 from groundstation.launch.orders import Orders
 from groundstation.parts.stars.messages import StarImage
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover
 from groundstation.recording.run_files import part_of
+from groundstation.recording.writer import Recorder
 
+PAYLOADS = installed_tables().payloads
 SOURCE = ROOT / "tests" / "replay" / "recordings" / "formation.mcap"
 VEHICLES = ("alpha", "beta", "gamma", "delta")
 WITH_CAMERA = VEHICLES[:2]
 BATCH_S = 0.05
 PICTURE_HZ = 15.0
+IMU_HZ = 250.0
+OF_EACH_SAMPLE = ("imu_bytes", "imu_raw", "imu", "state")
 KILLS = 20
+JUMPS = 20
+SHOWN_NS = 100_000_000
+MOST_JUMP_S, AIM_JUMP_S = 1.0, 0.3
 MOST_LOST_S = 0.3
 MOST_CORE, AIM_CORE = 0.12, 0.06
-READY_S = 20.0
-_RECORDER = (
-    "import pickle, sys; from groundstation.launch import recorder;"
-    "recorder.main(pickle.load(sys.stdin.buffer))"
-)
+READY_S = 120.0
+FORKS = multiprocessing.get_context("forkserver")
+"""Processes start as those of a run do: forked from one that has loaded everything."""
+FORKS.set_forkserver_preload([__name__, "groundstation.launch.recorder"])
 
 
 def measure(bench: Bench) -> list[Row]:
-    """A row for the load, one for the kills."""
+    """Rows for the load, for the kills, and for jumping in an hour's recording."""
     seconds = 60.0 * bench.live_minutes
-    return [*_loaded(bench, seconds), _killed(bench)]
+    return [*_loaded(bench, seconds), _killed(bench), _hour(bench)]
+
+
+def _hour(bench: Bench) -> Row:
+    path = bench.folder / "hour.mcap"
+    bench.say("recorder: writing an hour's recording")
+    with Recording(SOURCE) as source, Recorder(path, source.info) as recorder:
+        period_ns = source.stop_ns - source.start_ns + 1
+        flight = list(source.messages(PAYLOADS.values()))
+        for lap in range(round(3600e9 / period_ns)):
+            for message in flight:
+                at_ns = message.log_ns + lap * period_ns
+                envelope = message.envelope._replace(publish_ns=at_ns)
+                recorder.record_encoded(PAYLOADS[envelope.topic.noun], envelope, message.data, at_ns)
+    bench.say("recorder: jumping in it")
+    opened_s, jumped_s = [], []
+    draw = random.Random(2)
+    for _ in range(JUMPS):
+        begin_s = time.perf_counter()
+        with Recording(path) as recording:
+            opened_s.append(time.perf_counter() - begin_s)
+            at_ns = round(draw.uniform(recording.start_ns, recording.stop_ns))
+            begin_s = time.perf_counter()
+            recording.newest(PAYLOADS.values(), at_ns)
+            for _ in recording.messages(PAYLOADS.values(), start_ns=at_ns, stop_ns=at_ns + SHOWN_NS):
+                pass
+            jumped_s.append(time.perf_counter() - begin_s)
+    return at_most(
+        "an hour's recording, two mock-ups: a moment anywhere, the newest of every topic and the next 0.1 s",
+        max(jumped_s),
+        MOST_JUMP_S,
+        AIM_JUMP_S,
+        "s",
+        f"the first one after opening, worst of {JUMPS}; opening {max(opened_s):.3f} s; "
+        f"{path.stat().st_size / 1e6:.0f} MB",
+    )
 
 
 def _loaded(bench: Bench, seconds: float) -> list[Row]:
     path = bench.folder / "load.mcap"
     bench.say(f"recorder: {seconds:g} s of four mock-ups and two cameras")
     with _recording(path) as recorder, _publishing(recorder.endpoint) as sent:
-        begin_s, begin_cpu_s = time.monotonic(), cpu_s(recorder.process.pid)
+        begin_s, begin_cpu_s = time.monotonic(), cpu_s(recorder.pid)
         time.sleep(seconds)
-        took_s, used_s = time.monotonic() - begin_s, cpu_s(recorder.process.pid) - begin_cpu_s
+        took_s, used_s = time.monotonic() - begin_s, cpu_s(recorder.pid) - begin_cpu_s
         counts = sent()
         time.sleep(1.0)
         recorder.end()
@@ -88,8 +131,8 @@ def _killed(bench: Bench) -> Row:
         with _recording(path) as recorder, _publishing(recorder.endpoint, WITH_CAMERA, with_pictures=False):
             time.sleep(draw.uniform(1.5, 3.0))
             killed_ns = time.monotonic_ns()
-            recorder.process.send_signal(signal.SIGKILL)
-            recorder.process.wait()
+            os.kill(recorder.pid, signal.SIGKILL)
+            recorder.process.join()
         found = recover(part_of(path), path)
         recovered += found.messages > 0 and not found.orphans
         lost_s.append(_missing_s(path, killed_ns))
@@ -103,22 +146,29 @@ def _killed(bench: Bench) -> Row:
 
 
 @dataclass
-class Recorder:
+class Running:
     """A recorder's process and the hub's address."""
 
-    process: "subprocess.Popen[bytes]"
+    process: ForkServerProcess
     endpoint: str
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        assert self.process.pid is not None
+        return self.process.pid
 
     def end(self) -> None:
         """Ask it to end, and wait until it has."""
         self.process.terminate()
-        if self.process.wait(READY_S):
-            raise RuntimeError(f"the recorder ended with code {self.process.returncode}")
+        self.process.join(READY_S)
+        if self.process.exitcode:
+            raise RuntimeError(f"the recorder ended with code {self.process.exitcode}")
 
 
 @contextmanager
-def _recording(path: Path) -> Iterator[Recorder]:
-    rig = RIGS / "two_mock_ups.toml"
+def _recording(path: Path) -> Iterator[Running]:
+    rig = RIGS / "drawn_fixes.toml"
     text = rig.read_text(encoding="utf-8") + '\n[record]\nimages = "lossless"\n'
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -126,21 +176,28 @@ def _recording(path: Path) -> Iterator[Recorder]:
     with ZenohBus(endpoint, is_hub=True) as hub:
         ready = hub.collect("record/recorder", 4)
         orders = Orders("recorder", rig, text, endpoint, recording=path)
-        with subprocess.Popen([sys.executable, "-c", _RECORDER], stdin=subprocess.PIPE, cwd=ROOT) as process:
-            assert process.stdin is not None
-            process.stdin.write(pickle.dumps(orders))
-            process.stdin.flush()
-            try:
-                _wait(lambda: bool(ready.take()), process)
-                yield Recorder(process, endpoint)
-            finally:
-                process.kill()
+        process = FORKS.Process(target=record, args=(orders,), daemon=True)
+        process.start()
+        try:
+            _wait(lambda: bool(ready.take()), process)
+            yield Running(process, endpoint)
+        finally:
+            process.kill()
+            process.join()
 
 
-def _wait(is_there: Callable[[], bool], process: "subprocess.Popen[bytes]") -> None:
+def record(orders: Orders) -> None:
+    """Run the recorder as its launcher would: its stdin stays open."""
+    reading, writing = os.pipe()
+    sys.stdin = os.fdopen(reading)
+    del writing
+    recorder_process.main(orders)
+
+
+def _wait(is_there: Callable[[], bool], process: ForkServerProcess) -> None:
     until_s = time.monotonic() + READY_S
     while not is_there():
-        if process.poll() is not None or time.monotonic() > until_s:
+        if process.exitcode is not None or time.monotonic() > until_s:
             raise RuntimeError("the recorder did not start")
         time.sleep(0.02)
 
@@ -150,11 +207,10 @@ def _publishing(
     endpoint: str, vehicles: tuple[str, ...] = VEHICLES, *, with_pictures: bool = True
 ) -> Iterator[Callable[[], dict[tuple[str, str], int]]]:
     """Publish until the end; the function given stops it and tells how much was sent, by noun and owner."""
-    spawn = multiprocessing.get_context("spawn")
-    stop, results = spawn.Event(), spawn.Queue()
-    begun = [spawn.Event() for _ in vehicles]
+    stop, results = FORKS.Event(), FORKS.Queue()
+    begun = [FORKS.Event() for _ in vehicles]
     flyers = [
-        spawn.Process(
+        FORKS.Process(
             target=fly,
             args=(endpoint, name, with_pictures and name in WITH_CAMERA, event, stop, results),
             daemon=True,
@@ -184,18 +240,14 @@ def _publishing(
 
 def fly(endpoint: str, vehicle: str, has_camera: bool, begun: Event, stop: Event, results: object) -> None:
     """Publish what one vehicle of the source published, over and over, in batches as its process would."""
-    messages, period_ns = _source()
+    pieces = _source()
     counts: dict[tuple[str, str], int] = {}
     pictures = _pictures(vehicle) if has_camera else []
     picture_ns = round(1e9 / PICTURE_HZ)
     with ZenohBus(endpoint) as bus:
         begun.set()
         begin_ns = time.monotonic_ns()
-        queue = (
-            (begin_ns + lap * period_ns + at_ns, topic, data)
-            for lap in itertools.count()
-            for at_ns, topic, data in messages
-        )
+        queue = heapq.merge(*(_laps(begin_ns, *piece) for piece in pieces), key=itemgetter(0))
         following, picture = next(queue), 0
         while not stop.is_set():
             time.sleep(BATCH_S)
@@ -213,19 +265,37 @@ def fly(endpoint: str, vehicle: str, has_camera: bool, begun: Event, stop: Event
                 batch.add(Envelope(topic, vehicle, sequence, begin_ns + picture * picture_ns), data)
                 picture += 1
             bus.publish_batch(f"{vehicle}_flight", batch.take())
-    results.put(counts)  # type: ignore[attr-defined]  # a queue of the spawning context
+    results.put(counts)  # type: ignore[attr-defined]  # a queue of the starting context
 
 
-def _source() -> tuple[list[tuple[int, Topic, bytes]], int]:
-    """Messages of one vehicle: nanoseconds since the beginning, topic, payload; and how long all take."""
-    kinds = [kind for kind in installed_tables().payloads.values() if not kind.TOPIC.latched]
+Flown = list[tuple[int, Topic, bytes]]
+"""Messages: nanoseconds since the beginning, topic, payload."""
+
+
+def _laps(begin_ns: int, messages: Flown, period_ns: int) -> Iterator[tuple[int, Topic, bytes]]:
+    """The same over and over."""
+    for lap in itertools.count():
+        for at_ns, topic, data in messages:
+            yield begin_ns + lap * period_ns + at_ns, topic, data
+
+
+def _source() -> list[tuple[Flown, int]]:
+    """What one vehicle published, and its length: what each sample of the IMU brings, at 250 Hz; the rest."""
+    kinds = [kind for kind in PAYLOADS.values() if not kind.TOPIC.latched]
     with Recording(SOURCE) as recording:
         vehicle = next(c.owner for c in recording.channels if c.noun == "state")
         found = [
             (message.log_ns - recording.start_ns, message.envelope.topic, message.data)
             for message in recording.messages(kinds, [vehicle])
         ]
-        return found, recording.stop_ns - recording.start_ns + 1
+        period_ns = recording.stop_ns - recording.start_ns + 1
+    samples = sum(topic.noun == "imu" for _, topic, _ in found)
+    faster = IMU_HZ * period_ns * 1e-9 / samples
+    quick = [(round(at_ns / faster), *rest) for at_ns, *rest in found if rest[0].noun in OF_EACH_SAMPLE]
+    return [
+        (quick, round(period_ns / faster)),
+        ([row for row in found if row[1].noun not in OF_EACH_SAMPLE], period_ns),
+    ]
 
 
 def _pictures(vehicle: str) -> list[bytes]:
@@ -251,7 +321,7 @@ def _lost(path: Path, sent: dict[tuple[str, str], int]) -> tuple[int, int]:
 def _missing_s(path: Path, killed_ns: int) -> float:
     """From the newest state of the vehicle that lost most until the kill."""
     with Recording(path) as recording:
-        newest = recording.newest([installed_tables().payloads["state"]], 1 << 63)
+        newest = recording.newest([PAYLOADS["state"]], 1 << 63)
     return max((killed_ns - message.envelope.publish_ns) * 1e-9 for message in newest)
 
 
