@@ -29,7 +29,7 @@ def compare(
 
     Both count from the moment when their last vehicle flies.
 
-    Example: groundstation recording compare recordings/before recordings/after --out compared
+    Example: groundstation recording compare recordings/before recordings/after --out try/compared
     """
     if out is not None:
         check_folder(out)

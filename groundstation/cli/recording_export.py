@@ -38,9 +38,9 @@ def export(
     clock. truth.csv of a data set is written where the recording holds poses of a reference system, for
     judging results only.
 
-    Example: groundstation recording export run.mcap --csv tables
+    Example: groundstation recording export run.mcap --csv try/tables
 
-    Example: groundstation recording export run.mcap --parquet tables --topic alpha/state --topic alpha/imu
+    Example: groundstation recording export run.mcap --parquet try/t --topic alpha/state --topic alpha/imu
 
     Example: groundstation recording export run.mcap --fusion-folder try/again
     """

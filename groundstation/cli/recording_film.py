@@ -31,9 +31,9 @@ def film(
 
     Places are by truth where there is any, else by the estimate.
 
-    Example: groundstation recording film run.mcap --out run.mp4
+    Example: groundstation recording film run.mcap --out try/run.mp4
 
-    Example: groundstation recording film run.mcap --from-s 20 --to-s 60 --speed 4 --out fast.mp4
+    Example: groundstation recording film run.mcap --from-s 20 --to-s 60 --speed 4 --out try/fast.mp4
     """
     check_targets(out)
     try:
