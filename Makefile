@@ -5,7 +5,7 @@ CORE := .venv/.core
 PEERS := .venv/.peers
 EXTRAS := .venv/.extras
 
-.PHONY: run test test-all check bench bench-full mutate clean zig
+.PHONY: run test test-all check bench bench-full mutate docs clean zig
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test      the default tests"
 	@echo "make test-all  the slow tests too"
 	@echo "make check     format, lint, types, import contracts"
+	@echo "make docs      build the documentation as a site: build/site/index.html"
 	@echo "make bench     measure what docs/benchmarks.md reports"
 	@echo "make bench-full   every fault over 20 seeds, 10 h of healthy flight, 1000 hostile sequences, formation flight over"
 	@echo "                  100 seeds; goes on where it was ended"
@@ -54,6 +55,10 @@ check: $(CORE) $(EXTRAS)
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
+
+docs: $(CORE) $(EXTRAS)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --clean -f docs/site/mkdocs.yml
+	@echo "build/site/index.html; with its search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/site"
 
 $(PEERS): tools/requirements-bench.lock | $(STAMP)
 	@echo "Installing what the benches stand beside (once) ..."
