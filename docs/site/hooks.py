@@ -1,4 +1,4 @@
-"""What mkdocs does not bring: tolerant navigation, files outside ``docs``, lists as GitHub reads them, equations.
+"""What mkdocs does not bring: tolerant navigation, files outside ``docs``, lists as on GitHub, equations.
 
 Called by mkdocs while it builds; `mkdocs.yml` beside it names this file.
 """
@@ -18,6 +18,7 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+Row = str | dict[str, Any]
 SOURCE = "source"
 """Where files that pages link to, but that are no pages, stand in the site."""
 LINK = re.compile(r"(?<=\]\()([^)\s#]+)(#[^)\s]*)?(?=\))")
@@ -45,16 +46,18 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     return config
 
 
-def _existing(row: Any) -> Any:
+def _existing(row: Row) -> Row | None:
     """The row without what names no file; empty if nothing is left."""
     if isinstance(row, str):
         return row if (DOCS / row).is_file() else None
     ((title, inside),) = row.items()
-    kept = [each for each in map(_existing, inside) if each] if isinstance(inside, list) else _existing(inside)
+    kept = (
+        [each for each in map(_existing, inside) if each] if isinstance(inside, list) else _existing(inside)
+    )
     return {title: kept} if kept else None
 
 
-def _pages(rows: list[Any]) -> list[str]:
+def _pages(rows: list[Row]) -> list[str]:
     """Files that rows name, at any depth."""
     found: list[str] = []
     for row in rows:
@@ -77,7 +80,7 @@ def _outside(page: File) -> list[str]:
 
 
 def _path(page: str, target: str) -> str:
-    """What a link of a page leads to, from the project's folder; empty if that is inside ``docs`` or elsewhere."""
+    """Where a link of a page leads, from the project's folder; empty if inside ``docs`` or elsewhere."""
     if re.match(r"[a-z]+:", target) or target.startswith("/"):
         return ""
     path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(page), target))
@@ -123,7 +126,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return "\n".join(lines)
 
 
-def _equation(source: str, language: str, css_class: str, options: Any, md: Any, **kwargs: Any) -> str:
+def _equation(
+    source: str, language: str, css_class: str, options: object, md: object, **kwargs: object
+) -> str:
     """TeX as a drawing inside the page: nothing is loaded, and it takes the colour of the text."""
     del language, css_class, options, md, kwargs
     return f'<div class="math">{"".join(map(_drawn, filter(None, source.split(chr(92) * 2))))}</div>'
@@ -136,10 +141,13 @@ def _drawn(tex: str) -> str:
         outline = TextPath((0, 0), f"${line}$", size=100)
     steps = []
     for points, code in outline.iter_segments(simplify=False):
-        steps.append(LETTERS[code] + " ".join(f"{x:.0f} {-y:.0f}" for x, y in points.reshape(-1, 2) if code != Z))
+        steps.append(
+            LETTERS[code] + " ".join(f"{x:.0f} {-y:.0f}" for x, y in points.reshape(-1, 2) if code != Z)
+        )
     box = outline.get_extents()
     width, height = box.width + 10, box.height + 10
     return (
-        f'<svg role="img" aria-label="{html.escape(line)}" style="height: {height / 100:.2f}em" fill="currentColor"'
-        f' viewBox="{box.x0 - 5:.0f} {-box.y1 - 5:.0f} {width:.0f} {height:.0f}"><path d="{"".join(steps)}"/></svg>'
+        f'<svg role="img" aria-label="{html.escape(line)}" fill="currentColor"'
+        f' style="height: {height / 100:.2f}em" viewBox="{box.x0 - 5:.0f} {-box.y1 - 5:.0f} {width:.0f}'
+        f' {height:.0f}"><path d="{"".join(steps)}"/></svg>'
     )
