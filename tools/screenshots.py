@@ -19,12 +19,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Error as PageError
 from rich.console import Console
 
 from groundstation.cli.console_option import FIRST_PORT, HOST, console_access
@@ -37,7 +39,7 @@ ROOT = Path(__file__).parents[1]
 RIG = ROOT / "examples" / "rigs" / "two_mock_ups_drawn.toml"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
-STEP_S, READY_MS, LOOK_MS = 0.25, 200_000, 4_000
+STEP_S, READY_MS, LOOK_MS, RETRY_MS = 0.25, 200_000, 4_000, 200
 FROM_END_S = 5.5
 """Of the recording: soon after a picture that was asked for came."""
 GOAL = "{ x_m = 0.1, y_m = 0.5, heading_deg = 60.0 }"
@@ -93,7 +95,7 @@ class Photographer:
             has_touch=size == "phone",
         )
         page = context.new_page()
-        page.goto(self._address)
+        open_when_served(page, self._address)
         page.wait_for_function("() => document.getElementById('connection').textContent === 'live'")
         page.get_by_role("tab", name=screen).click()
         return page
@@ -105,6 +107,19 @@ class Photographer:
         taken.convert("RGB").quantize(COLOURS).save(path, optimize=True)
         page.context.close()
         print(f"{path}", flush=True)
+
+
+def open_when_served(page: Page, address: str) -> None:
+    """Open a page whose server may have printed its address before it listens."""
+    until_s = time.monotonic() + READY_MS / 1000
+    while True:
+        try:
+            page.goto(address)
+            return
+        except PageError:
+            if time.monotonic() > until_s:
+                raise
+            page.wait_for_timeout(RETRY_MS)
 
 
 def photograph_flight(camera: Photographer) -> None:
@@ -128,13 +143,12 @@ def photograph_flight(camera: Photographer) -> None:
 
 def photograph_recording(camera: Photographer) -> None:
     """Screens over a recording."""
-    for screen, scheme, name in (
-        ("Charts", "light", "console_charts"),
-        ("Charts", "dark", "console_charts_dark"),
-        ("Camera", "light", "console_camera"),
-        ("Table", "light", "console_replay"),
+    for screen, name in (
+        ("Charts", "console_charts"),
+        ("Camera", "console_camera"),
+        ("Table", "console_replay"),
     ):
-        page = camera.open(screen, scheme=scheme)
+        page = camera.open(screen)
         page.wait_for_function("() => document.querySelector('#replay input')")
         page.evaluate(
             "(t) => { const bar = document.querySelector('#replay input'); bar.value = Number(bar.max) - t;"
