@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -12,6 +11,7 @@ from calibration.guided_steps import GuidedSteps
 from calibration.live_curve import LiveCurve
 from calibration.manoeuvres import tour
 from calibration.motion_capture.alignment import Alignment, Array, Pairs, align, residuals
+from calibration.motion_capture.seen_by_both import SeenByBoth, pairs_of
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
 from groundstation.declarations.fix import PoseFix
@@ -61,10 +61,6 @@ STEPS: tuple[Step, ...] = (
     ),
 )
 EVERY_S = 7.0
-PAIR_EVERY_NS = 100_000_000
-KEPT_NS, WAITS_NS = 3_000_000_000, 1_500_000_000
-LONGEST_GAP_NS = 100_000_000
-"""Between two poses of the system; nothing is interpolated over more."""
 JUDGED_EVERY_S = 3.0
 REFERENCE_SIGMA = (0.0003, 0.0003)
 """Of a reference, which states none: m, rad."""
@@ -94,10 +90,7 @@ class GuidedAlignment:
         self.kinds: tuple[type[Message], ...] = (CapturedPose, SOURCES[source], *GuidedSteps.kinds)
         manoeuvres = {"move": tour, CHECK: tour}
         self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S)
-        self._seen: deque[tuple[int, Array]] = deque()
-        self._velocity: deque[tuple[int, Array]] = deque()
-        self._waiting: deque[tuple[int, Array, tuple[float, float], bool]] = deque()
-        self._pair_ns = 0
+        self._both = SeenByBoth((self._system.sigma_xy_m, self._system.sigma_heading_rad))
         self._fitted: list[Array] = []
         self._checked: list[Array] = []
         self._now: Alignment | None = None
@@ -113,6 +106,10 @@ class GuidedAlignment:
         """How each step ended."""
         return self._steps.outcomes
 
+    @property
+    def _is_aside(self) -> bool:
+        return self._steps.name == CHECK
+
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle or of the system."""
         del now_ns
@@ -121,16 +118,20 @@ class GuidedAlignment:
                 self._take_seen(message)
             case VehicleState() if message.vehicle == self._vehicle:
                 velocity = np.array([*message.velocity_table_m_s, message.rate_rad_s])
-                _keep(self._velocity, message.stamp_ns, velocity)
+                self._both.add_velocity(message.stamp_ns, velocity)
             case ReferenceState() if message.vehicle == self._vehicle:
                 pose = np.array([*message.position_table_m, message.heading_rad])
-                self._take_pose(message.stamp_ns, pose, REFERENCE_SIGMA)
+                self._both.add_pose(message.stamp_ns, pose, REFERENCE_SIGMA, self._is_aside)
             case PoseFix(fix=True) if message.vehicle == self._vehicle:
                 pose = np.array([message.x_m, message.y_m, message.heading_rad])
                 xy_m2 = 0.5 * (message.covariance[0] + message.covariance[4])
-                self._take_pose(message.stamp_ns, pose, (math.sqrt(xy_m2), math.sqrt(message.covariance[8])))
+                sigma = (math.sqrt(xy_m2), math.sqrt(message.covariance[8]))
+                self._both.add_pose(message.stamp_ns, pose, sigma, self._is_aside)
         if message.vehicle == self._vehicle:
             self._steps.take(message)
+        for stamp_ns, row, is_aside in self._both.matched():
+            (self._checked if is_aside else self._fitted).append(row)
+            self._draw(row, stamp_ns)
 
     def advice(self, now_s: float) -> Advice:
         """Return what to do now."""
@@ -156,9 +157,9 @@ class GuidedAlignment:
         unknown = self._steps.hindrance()
         if unknown:
             return unknown
-        if not self._seen:
+        if not self._both.is_seen:
             return f"motion capture does not report the rigid body {self._body_name!r}."
-        if not self._waiting and not self._pair_ns:
+        if not self._both.has_poses:
             return f"no pose of {self._vehicle} is received from the other source ({self._source})."
         return ""
 
@@ -180,7 +181,7 @@ class GuidedAlignment:
         Raises:
             CalibrationRefusedError: Too little was seen by both.
         """
-        fitted = _pairs(self._fitted)
+        fitted = pairs_of(self._fitted)
         found = align(fitted)
         quantities = self._quantities(found)
         verification, warnings, drawings = self._verified(found.value)
@@ -215,41 +216,11 @@ class GuidedAlignment:
         except ValueError:
             return  # a quaternion that is none is no pose
         exposure_ns = message.stamp_ns - round(self._system.delay_s * 1e9)
-        _keep(self._seen, exposure_ns, np.array([pose.x_m, pose.y_m, pose.heading_rad]))
-        self._match()
-
-    def _take_pose(self, stamp_ns: int, pose: Array, sigma: tuple[float, float]) -> None:
-        """A pose of the other source waits until the system's poses around it are here."""
-        newest_ns = self._waiting[-1][0] if self._waiting else self._pair_ns
-        if stamp_ns - newest_ns >= PAIR_EVERY_NS:
-            self._waiting.append((stamp_ns, pose, sigma, self._steps.name == CHECK))
-            self._match()
-
-    def _match(self) -> None:
-        while self._waiting and self._seen:
-            stamp_ns, pose, (xy_m, heading_rad), is_check = self._waiting[0]
-            if self._seen[-1][0] < stamp_ns and self._seen[-1][0] - stamp_ns > -WAITS_NS:
-                return
-            self._waiting.popleft()
-            seen, velocity = _at(self._seen, stamp_ns), _at(self._velocity, stamp_ns)
-            if seen is None:
-                continue
-            self._pair_ns = stamp_ns
-            row = np.array(
-                [
-                    *seen,
-                    *pose,
-                    *(np.zeros(3) if velocity is None else velocity),
-                    math.hypot(xy_m, self._system.sigma_xy_m),
-                    math.hypot(heading_rad, self._system.sigma_heading_rad),
-                ]
-            )
-            (self._checked if is_check else self._fitted).append(row)
-            self._draw(row, stamp_ns)
+        self._both.add_seen(exposure_ns, np.array([pose.x_m, pose.y_m, pose.heading_rad]))
 
     def _draw(self, row: Array, stamp_ns: int) -> None:
         value = self._value() if self._now is None else self._now.value
-        one = _pairs([row])
+        one = pairs_of([row])
         off = residuals(value, one)[0]
         self._places[0].add(float(row[3]), float(row[4]))
         self._places[1].add(float(row[3] + off[0]), float(row[4] + off[1]))
@@ -258,7 +229,7 @@ class GuidedAlignment:
 
     def _judge(self) -> None:
         try:
-            self._now = align(_pairs(self._fitted))
+            self._now = align(pairs_of(self._fitted))
         except CalibrationRefusedError:
             self._now = None
 
@@ -314,7 +285,7 @@ class GuidedAlignment:
     def _verified(self, value: Array) -> tuple[dict[str, Quantity], tuple[str, ...], tuple[Drawing, ...]]:
         if not self._checked:
             return {}, ("it is not verified: nothing was seen by both after the fit",), ()
-        pairs = _pairs(self._checked)
+        pairs = pairs_of(self._checked)
         after, before = residuals(value, pairs), residuals(self._value(), pairs)
         numbers = _rms_quantities(np.sqrt((after**2).mean(axis=0)))
         numbers |= {
@@ -341,39 +312,6 @@ def _sections(rig: Rig, vehicle: str) -> tuple[MotionCaptureSection, CapturedBod
     assert system is not None
     assert body is not None
     return system, body
-
-
-def _keep(kept: deque[tuple[int, Array]], stamp_ns: int, row: Array) -> None:
-    if kept and stamp_ns <= kept[-1][0]:
-        return
-    kept.append((stamp_ns, row))
-    while stamp_ns - kept[0][0] > KEPT_NS:
-        kept.popleft()
-
-
-def _at(kept: deque[tuple[int, Array]], stamp_ns: int) -> Array | None:
-    """Between the two rows around a moment; None where they are too far apart. The last is a turn."""
-    before = None
-    for row in reversed(kept):
-        if row[0] <= stamp_ns:
-            before = row
-            break
-        after = row
-    if before is None or kept[-1][0] < stamp_ns:
-        return None
-    if before[0] == stamp_ns:
-        return before[1]
-    if after[0] - before[0] > LONGEST_GAP_NS:
-        return None
-    share = (stamp_ns - before[0]) / (after[0] - before[0])
-    step = after[1] - before[1]
-    step[2] = wrap_angle(step[2])
-    return np.asarray(before[1] + share * step)
-
-
-def _pairs(rows: Sequence[Array]) -> Pairs:
-    table = np.array(rows).reshape(-1, 11)
-    return Pairs(table[:, :3], table[:, 3:6], table[:, 6:9], table[:, 9:])
 
 
 def _rms_quantities(rms: Array) -> dict[str, Quantity]:

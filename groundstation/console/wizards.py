@@ -83,7 +83,7 @@ class Wizards:
 
     async def run(self) -> None:
         """Lead whatever was started, until cancelled."""
-        await asyncio.to_thread(self._load)
+        self._wizards, self._broken = await asyncio.to_thread(_installed)
         self._show()
         while True:
             await asyncio.sleep(STEP_S)
@@ -218,13 +218,6 @@ class Wizards:
         write_files(contents)
         return tuple(str(path.resolve()) for path in contents)
 
-    def _load(self) -> None:
-        for name in wizard_names():
-            try:
-                self._wizards[name] = load_wizard(name)
-            except UsageError as error:
-                self._broken[name] = str(error)
-
     def _untap(self) -> None:
         if self._tap is not None:
             self._feed.untap(self._tap)
@@ -238,6 +231,18 @@ class Wizards:
 
     def _show(self) -> None:
         self._tell("wizard", self.frame())
+
+
+def _installed() -> tuple[dict[str, Wizard], dict[str, str]]:
+    """All that can be loaded, and why others cannot, by name."""
+    wizards: dict[str, Wizard] = {}
+    broken: dict[str, str] = {}
+    for name in wizard_names():
+        try:
+            wizards[name] = load_wizard(name)
+        except UsageError as error:
+            broken[name] = str(error)
+    return wizards, broken
 
 
 def asked_of(body: Mapping[str, Any]) -> str:

@@ -13,8 +13,9 @@ LONGEST_S = 90.0
 @pytest.fixture
 def web(launch, two_drawn):
     run = launch(two_drawn, has_console=True)
-    line = run.wait_for("console: http://127.0.0.1:")
     run.wait_until_flying()
+    run.rewind()
+    line = run.wait_for("console: http://127.0.0.1:")
     with httpx.Client(base_url=re.search(r"http://\S+", line)[0], timeout=20.0) as client:
         yield client
 
