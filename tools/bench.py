@@ -52,6 +52,9 @@ from bench.fusion import accuracy as fusion_accuracy  # noqa: E402
 from bench.fusion import folder as fusion_folder  # noqa: E402
 from bench.fusion import peers as fusion_peers  # noqa: E402
 from bench.fusion import speed as fusion_speed  # noqa: E402
+from bench.relative import accuracy as relative_accuracy  # noqa: E402
+from bench.relative import images as relative_images  # noqa: E402
+from bench.relative import peers as relative_peers  # noqa: E402
 from bench.rows import Bench, Measure, Row  # noqa: E402
 from bench.star import bound as star_bound  # noqa: E402
 from bench.star import damage as star_damage  # noqa: E402
@@ -99,6 +102,9 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "fusion_speed": fusion_speed.measure,
         "fusion_peers": fusion_peers.measure,
         "fusion_folder": fusion_folder.measure,
+        "relative": relative_accuracy.measure,
+        "relative_images": relative_images.measure,
+        "relative_peers": relative_peers.measure,
         "fresh_clone": fresh_clone.measure,
     }
 )

@@ -81,7 +81,9 @@ def _frame(path: Path, rows: NDArray[np.float64], lines: NDArray[np.int64], case
     variance = case.sigma_px**2
     covariances = np.broadcast_to(variance * np.eye(2), (len(rows), 2, 2))
     return Frame(
-        name, float(rows[0, 1]), Centres(rows[:, 3:5].copy(), covariances, markers if case.labelled else None)
+        name,
+        float(rows[0, 1]),
+        Centres(rows[:, 3:5].copy(), covariances, markers if case.labelled else None, case.sigma_px),
     )
 
 

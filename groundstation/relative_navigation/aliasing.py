@@ -85,10 +85,12 @@ class AliasWatch:
         if len(seen) == 2:
             return angle > QUARTER_RAD
         slowest = self._miss(seen, shown)
-        others = [self._miss(seen, other) for other in _further(shown, angle)]
+        if slowest <= 1.0 and angle <= QUARTER_RAD:
+            return False
+        faster = any(self._miss(seen, other) <= 1.0 for other in _further(shown, angle))
         if slowest <= 1.0:
-            return angle > QUARTER_RAD and min(others) <= 1.0
-        if min(others) <= 1.0 or angle > QUARTER_RAD:
+            return faster
+        if faster or angle > QUARTER_RAD:
             return True
         return self._off_rad(seen, shown) > UNEXPLAINED_RAD
 

@@ -96,27 +96,35 @@ def grey_centres(
         background: Of it.
         height: What unresolved spots would stand out by if they were larger; None: as the brightest pixel.
     """
-    rough = weighted_centres(picture, blobs, background)
     sides = np.array([blob.box[2:] for blob in blobs], dtype=np.float64)
-    disk = (sides.max(axis=1) <= OBLONG * sides.min(axis=1)) & (rough.radii < LARGEST_DISK_PX)
-    disk &= sides.max(axis=1) <= 3.0 * rough.radii + 3.0
-    pixels, covariances, radii = rough.pixels.copy(), rough.covariances.copy(), rough.radii.copy()
-    small = rough.radii < 3.0
+    longer, shorter = sides.max(axis=1), sides.min(axis=1)
+    count = len(blobs)
+    pixels, covariances = np.empty((count, 2)), np.empty((count, 2, 2))
+    significance, radii = np.zeros(count), 0.5 * (longer + shorter) / 2.0
+    is_fitted = np.zeros(count, dtype=np.bool_)
+    disk = (longer <= OBLONG * shorter) & (longer < 2.0 * LARGEST_DISK_PX)
+    start = np.array([blob.outline.mean(axis=0) for blob in blobs])
     resolved: list[float] = []
-    for group in (np.flatnonzero(disk & small), np.flatnonzero(disk & ~small)):
+    for group in (np.flatnonzero(disk & (radii < 3.0)), np.flatnonzero(disk & (radii >= 3.0))):
         if not len(group):
             continue
-        fits = fit_disks(
-            picture, rough.pixels[group], rough.radii[group], background.level, background.sigma, height
-        )
-        moved = np.abs(fits.centres - rough.pixels[group]).max(axis=1)
-        good = (fits.misfits < POOR_FIT) & (moved < 1.0 + 0.3 * rough.radii[group])
+        fits = fit_disks(picture, start[group], radii[group], background.level, background.sigma, height)
+        moved = np.abs(fits.centres - start[group]).max(axis=1)
+        good = (fits.misfits < POOR_FIT) & (moved < 1.2 + 0.3 * radii[group])
         chosen = group[good]
+        is_fitted[chosen] = True
         pixels[chosen], covariances[chosen] = fits.centres[good], fits.covariances[good]
+        area = math.pi * np.square(fits.radii[good])
+        significance[chosen] = fits.heights[good] * area / (background.sigma * np.sqrt(area + 9.0))
         radii[chosen] = fits.radii[good]
         resolved += fits.heights[good & (fits.radii > UNRESOLVED_PX)].tolist()
+    rest = np.flatnonzero(~is_fitted)
+    if len(rest):
+        rough = weighted_centres(picture, [blobs[i] for i in rest.tolist()], background)
+        pixels[rest], covariances[rest] = rough.pixels, rough.covariances
+        significance[rest], radii[rest] = rough.significance, rough.radii
     middle = float(np.median(resolved)) if resolved else None
-    return BlobCentres(pixels, covariances, rough.significance, radii, middle)
+    return BlobCentres(pixels, covariances, significance, radii, middle)
 
 
 def contour_centres(

@@ -1,6 +1,6 @@
 """Round spots fitted as disks with a soft edge: sub-pixel centres with their covariance, all spots at once.
 
-``I = b + A Phi((r - d) / s)`` averaged over each pixel's area, d the distance from the centre; unknown are
+``I = b + A step((r - d) / s)`` averaged over each pixel's area, d the distance from the centre; unknown are
 the centre, A and r. The background b is the picture's. A spot that is no disk shows in its residuals: they
 widen its covariance. Of a spot hardly larger than a pixel only the light is seen, A times the area: its A is
 that of the picture's other spots, and then its centre is four times better known.
@@ -12,22 +12,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-EDGE_PX = 0.2
+EDGE_PX = 0.35
 """Softness of an edge beside the pixel's own size: optics."""
 LARGE_PX = 2.5
 """Radius from which a pixel needs no sub-pixels; its size then goes into the edge."""
 _SUB = np.array((-0.25, 0.25))
 """Points a side that integrate over a pixel."""
-_LARGE_EDGE_PX = float(np.hypot(EDGE_PX, 12.0**-0.5))
+_LARGE_EDGE_PX = 0.75
 ITERATIONS = 5
+REST_PX = 0.006
+"""After a step of this the next one would be a hundredth of it."""
 FLOOR_PX = 0.004
 """What the model of a disk leaves of a perfect one."""
 MOST_HALF_PX = 40
+MARGIN_PX = 1.3
+"""Around a rough radius, which is that of the blob's box."""
 UNRESOLVED_PX = 1.3
 """Radius below which height and radius of a spot cannot be told apart."""
 POINT_PX, POINT_FLOOR_PX = 0.72, 0.03
@@ -66,7 +69,7 @@ def fit_disks(
         sigma: Noise.
         height: A of spots below `UNRESOLVED_PX`; None: the most that any pixel of the spots stands out.
     """
-    half = min(MOST_HALF_PX, int(np.ceil(float(radii.max()) + 1.6)))
+    half = min(MOST_HALF_PX, int(np.ceil(float(radii.max()) + MARGIN_PX)))
     sub, edge = (_SUB, EDGE_PX) if float(radii.max()) < LARGE_PX else (np.zeros(1), _LARGE_EDGE_PX)
     values, du, dv, weight = _windows(picture, centres, radii, half, level)
     count, pixels = values.shape
@@ -100,7 +103,7 @@ def fit_disks(
         parameters += step
         parameters[:, 3] = np.clip(parameters[:, 3], 0.35, 2.0 * start + 1.0)
         parameters[:, 2] = np.clip(parameters[:, 2], sigma, 600.0)
-        if float(np.abs(step[:, :2]).max()) < 1e-3:
+        if float(np.abs(step[:, :2]).max()) < REST_PX:
             break
     used = weight.sum(axis=1)
     misfits = (off * off).sum(axis=1) / (sigma**2 * np.maximum(1.0, used - 4.0))
@@ -126,14 +129,17 @@ def _windows(
     shape = values.shape
     du = np.broadcast_to((columns - centres[:, :1])[:, None], shape).reshape(len(centres), -1)
     dv = np.broadcast_to((rows - centres[:, 1:])[:, :, None], shape).reshape(len(centres), -1)
-    weight = good.reshape(len(centres), -1) & (du * du + dv * dv <= (radii[:, None] + 1.6) ** 2)
+    weight = good.reshape(len(centres), -1) & (du * du + dv * dv <= (radii[:, None] + MARGIN_PX) ** 2)
     if len(centres) > 1:  # pixels nearer to another spot belong to it
         apart = np.linalg.norm(centres[:, None] - centres[None], axis=2)
         for one, other in np.argwhere((apart > 0.0) & (apart < 2.0 * half + 2.0)):
             between = centres[other] - centres[one]
             nearer = np.hypot(du[one] - between[0], dv[one] - between[1]) - radii[other]
             weight[one] &= nearer > np.hypot(du[one], dv[one]) - radii[one]
-    return values.reshape(len(centres), -1) - level, du, dv, weight.astype(np.float64)
+    kept = np.argsort(~weight, axis=1, kind="stable")[:, : max(1, int(weight.sum(axis=1).max()))]
+    found = (values.reshape(len(centres), -1) - level, du, dv, weight.astype(np.float64))
+    cut = tuple(np.take_along_axis(each, kept, axis=1) for each in found)
+    return cut[0], cut[1], cut[2], cut[3]
 
 
 def _normal(
@@ -148,9 +154,11 @@ def _normal(
     u, v, height, radius = parameters.T[:, :, None, None]
     x, y = places_u - u, places_v - v
     distance = np.sqrt(x * x + y * y + 1e-12)
-    deep = (radius - distance) / edge
-    cover = 0.5 + 0.5 * erf(deep * 0.5**0.5)
-    slope = np.exp(-0.5 * deep * deep) * ((2.0 * np.pi) ** -0.5 / edge)
+    # a smooth step instead of Phi: 3 t^2 - 2 t^3
+    deep = np.clip((radius - distance) * (0.5 / edge) + 0.5, 0.0, 1.0)
+    square = deep * deep
+    cover = square * (3.0 - 2.0 * deep)
+    slope = (deep - square) * (3.0 / edge)
     share = 1.0 / x.shape[2]
     push = slope / distance
     scaled = (share * height[:, :, 0]) * weight

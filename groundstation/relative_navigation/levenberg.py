@@ -6,13 +6,14 @@ worse. With a prior it gives the most probable pose of prediction and frame toge
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.relative_navigation.pinhole import PinholeCamera
-from groundstation.relative_navigation.pixel_equations import cost_of, whitened
+from groundstation.relative_navigation.pixel_equations import whitened
 from groundstation.relative_navigation.pose import Pose, PoseFit, Sight
 
 Floats = NDArray[np.float64]
@@ -22,8 +23,8 @@ REST = 1e-8
 MOST_ITERATIONS = 60
 FIRST_DAMPING = 1e-3
 MOST_DAMPING = 1e12
-_LEAST_INFORMATION = 1e-18
-"""Of a direction, as a share of the best seen: below it the frame says nothing about it."""
+_MOST_INFLATION = 1e13
+"""Of a variance by what else is unknown: beyond it the frame says nothing about a direction of the pose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,14 +78,12 @@ def solve_levenberg(
         if damping == 0.0 and float(gradient @ step) < REST:
             return _finished(pose.moved(step), normal, cost, iteration)
         tried = pose.moved(step)
-        cost_tried = cost_of(camera, points, sight, tried) + _prior_cost(prior, tried)
-        if cost_tried <= cost * (1.0 + 1e-12):
+        found = whitened(camera, points, sight, tried)
+        cost_tried = math.inf if found is None else float(found[0] @ found[0]) + _prior_cost(prior, tried)
+        if found is not None and cost_tried <= cost * (1.0 + 1e-12):
             gain = cost - cost_tried
             damping = 0.0 if damping <= FIRST_DAMPING else 0.1 * damping
             pose, cost = tried, cost_tried
-            found = whitened(camera, points, sight, pose)
-            if found is None:
-                return _nothing(pose)
             off, rows = found
             if gain <= 1e-12 * cost and float(gradient @ step) < 1e-3:  # rounding, with a tiny sigma
                 return _finished(pose, rows.T @ rows if prior is None else normal, cost, iteration)
@@ -115,11 +114,14 @@ def _prior_cost(prior: PosePrior | None, pose: Pose) -> float:
 
 def _finished(pose: Pose, normal: Floats, cost: float, iterations: int) -> PoseFit:
     scale = 1.0 / np.sqrt(np.maximum(normal.flat[::7], 1e-300))
-    scaled = normal * scale * scale[:, None]
-    values = np.linalg.eigvalsh(scaled)
-    if not values[0] > _LEAST_INFORMATION * values[-1]:
+    try:
+        covariance = np.linalg.inv(normal * scale * scale[:, None])
+    except np.linalg.LinAlgError:
         return PoseFit(pose, np.full((6, 6), np.nan), cost, iterations, converged=False)
-    covariance = np.linalg.inv(scaled) * scale * scale[:, None]
+    inflated = covariance.flat[::7]  # how much worse each number is known than if it were alone
+    if not (inflated.min() > 0.0 and inflated.max() < _MOST_INFLATION):
+        return PoseFit(pose, np.full((6, 6), np.nan), cost, iterations, converged=False)
+    covariance = covariance * scale * scale[:, None]
     return PoseFit(pose, 0.5 * (covariance + covariance.T), cost, iterations, converged=True)
 
 

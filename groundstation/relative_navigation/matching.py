@@ -39,11 +39,13 @@ class Centres:
         pixels: (k, 2).
         covariances: (k, 2, 2), px^2.
         points: Which point of the target each is, (k,), -1 where nobody knows; None: nobody knows any.
+        sigma_px: Of all of them, where the covariances are all alike; None: look at these.
     """
 
     pixels: Floats
     covariances: Floats
     points: Ints | None = None
+    sigma_px: float | None = None
 
     def __len__(self) -> int:
         return len(self.pixels)

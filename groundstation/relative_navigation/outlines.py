@@ -42,10 +42,8 @@ def blobs_of(picture: Picture, level: int, glare: Picture | None = None) -> list
     outlines, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
     for outline in outlines[: MOST_BLOBS + 1]:
-        points = np.asarray(outline[:, 0], np.int32)
-        left, top = points.min(axis=0).tolist()
-        right, bottom = points.max(axis=0).tolist()
-        found.append(Blob(points, (left, top, right - left + 1, bottom - top + 1)))
+        left, top, width, height = cv2.boundingRect(outline)
+        found.append(Blob(np.asarray(outline[:, 0], np.int32), (left, top, width, height)))
     return found
 
 

@@ -13,16 +13,28 @@ from numpy.typing import NDArray
 
 from groundstation.relative_navigation.answers import NOTHING3, Reason, Status, Track, lost
 from groundstation.relative_navigation.first_poses import Candidate, enough, first_poses
-from groundstation.relative_navigation.matching import Centres, Matches, match_labelled, match_near
-from groundstation.relative_navigation.pixel_equations import jacobian, predicted_pixels
+from groundstation.relative_navigation.matching import (
+    Centres,
+    Matches,
+    match_jointly,
+    match_labelled,
+    match_near,
+)
+from groundstation.relative_navigation.pixel_equations import predicted_pixels
 from groundstation.relative_navigation.pose import Pose, PoseFit
 from groundstation.relative_navigation.rotations import rotation_vector
 from groundstation.relative_navigation.solvers import PoseSolver
-from groundstation.relative_navigation.subset_search import GATE, sight_of
+from groundstation.relative_navigation.subset_search import sight_of
 from groundstation.relative_navigation.tracker_settings import Frame, TrackerSettings
 
 Floats = NDArray[np.float64]
 
+NEAR_PX = 12.0
+"""Neighbourhood of a point's last place where no epsilon is given."""
+STRAY_TURN_RAD, STRAY_SHARE = 0.12, 0.05
+"""How far a target may have turned and moved, as a share of its distance, since the last frame, one sigma."""
+MOST_COST = 8.0
+"""Sum of squares for each centre, in sigmas, beyond which centres were taken for the wrong points."""
 STRAY_TURN_RAD_S, STRAY_SHARE_S = 0.02, 0.01
 """How fast an unseen target is taken to turn, and to move as a share of its distance, one sigma."""
 
@@ -85,21 +97,30 @@ class SingleFrames:
         settings = self._settings
         points, count = settings.target.points_from_mass_m, len(settings.target)
         if centres.points is not None:
-            matches = match_labelled(centres, count)
-        elif not len(centres):
+            return self._fitted(centres, match_labelled(centres, count), last.pose)
+        if not len(centres):
             return None
-        else:
-            reach = settings.reach_px
-            rows = jacobian(settings.camera, points, last.pose)
-            wide = np.diag([1.0] * 6) * 1e-12 + 9.0 * last.covariance
-            spreads = rows @ wide @ rows.transpose(0, 2, 1)
-            matches = match_near(
-                predicted_pixels(settings.camera, points, last.pose), spreads, centres, reach
-            )
+        reach = NEAR_PX if settings.reach_px is None else settings.reach_px
+        predicted = predicted_pixels(settings.camera, points, last.pose)
+        near = match_near(predicted, np.broadcast_to(reach**2 * np.eye(2), (count, 2, 2)), centres, reach)
+        found = self._fitted(centres, near, last.pose)
+        if found is not None or settings.reach_px is not None:
+            return found
+        share = STRAY_SHARE * float(np.linalg.norm(last.pose.position_camera_m))
+        wide = np.diag([share**2] * 3 + [STRAY_TURN_RAD**2] * 3)
+        for pose, matches in match_jointly(settings.camera, points, centres, last.pose, wide):
+            found = self._fitted(centres, matches, pose)
+            if found is not None:
+                return found
+        return None
+
+    def _fitted(self, centres: Centres, matches: Matches, start: Pose) -> tuple[PoseFit, Matches] | None:
+        settings = self._settings
         if not enough(matches, settings.target):
             return None
-        fit = self._solver(settings.camera, points, sight_of(centres, matches), last.pose, None)
-        if not fit.converged or fit.cost > GATE * len(matches):
+        points = settings.target.points_from_mass_m
+        fit = self._solver(settings.camera, points, sight_of(centres, matches), start, None)
+        if not fit.converged or fit.cost > MOST_COST * len(matches):
             return None
         return fit, matches
 

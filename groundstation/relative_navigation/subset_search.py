@@ -130,11 +130,11 @@ def refine(camera: PinholeCamera, points: Floats, centres: Centres, pose: Pose) 
 
 def sight_of(centres: Centres, matches: Matches) -> Sight:
     """Return matched centres as solvers take them."""
+    pixels = centres.pixels[matches.centre]
+    if centres.sigma_px is not None:
+        return Sight(matches.point, pixels, 1.0 / centres.sigma_px)
     covariances = centres.covariances[matches.centre]
     a, b, d = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
-    pixels = centres.pixels[matches.centre]
-    if not np.any(b) and float(np.ptp(a)) == 0.0 and np.array_equal(a, d):
-        return Sight(matches.point, pixels, float(1.0 / np.sqrt(a[0])) if len(a) else 1.0)
     weights = np.zeros_like(covariances)  # inverse of the lower Cholesky factor
     root = np.sqrt(a)
     rest = np.sqrt(d - b * b / a)

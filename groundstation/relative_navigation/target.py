@@ -88,6 +88,16 @@ class Target:
         """Whether some of the points do not span space: then a lone frame may have two poses."""
         if len(chosen) < 4:
             return True
+        key = chosen.tobytes()
+        if key not in self._known_planes:
+            self._known_planes[key] = self._spans_no_space(chosen)
+        return self._known_planes[key]
+
+    @cached_property
+    def _known_planes(self) -> dict[bytes, bool]:
+        return {}
+
+    def _spans_no_space(self, chosen: Ints) -> bool:
         spread = self.points_body_m[chosen] - self.points_body_m[chosen].mean(axis=0)
         sizes = np.linalg.svd(spread, compute_uv=False)
         return bool(sizes[2] <= PLANAR_SHARE * sizes[0])

@@ -25,7 +25,7 @@ from groundstation.relative_navigation.matching import (
     match_labelled,
     match_near,
 )
-from groundstation.relative_navigation.motion_filter import SURPRISE, MotionFilter
+from groundstation.relative_navigation.motion_filter import SURPRISE, FrameInformation, MotionFilter
 from groundstation.relative_navigation.pixel_equations import jacobian, predicted_pixels
 from groundstation.relative_navigation.pose import Pose, PoseFit
 from groundstation.relative_navigation.solvers import PoseSolver
@@ -34,6 +34,7 @@ from groundstation.relative_navigation.tracker_settings import Frame, TrackerSet
 
 Floats = NDArray[np.float64]
 
+Solved = tuple[PoseFit, Matches, FrameInformation]
 CONTRADICTION = 45.0
 """Squared distance in sigmas of a pose from its prediction at which the frame is solved without it."""
 DECIDED_RAD = 0.09
@@ -85,20 +86,16 @@ class MotionTracker:
 
     def _take(self, hypothesis: Hypothesis, frame: Frame) -> tuple[PoseFit, Matches, float] | None:
         """Give a frame to one hypothesis: pose, pairs and log likelihood; None if it explains nothing."""
-        motion, settings = hypothesis.motion, self._settings
+        motion = hypothesis.motion
         motion.predict(frame.t_s)
         pose, covariance = motion.prior
         found = self._solved(frame.centres, pose, covariance)
         if found is None:
             return None
-        fit, matches = found
+        fit, matches, information = found
         off = fit.pose.minus(pose)
         if float(off @ np.linalg.solve(covariance, off)) > SURPRISE:
             motion.reopen(fit.pose)
-        sight = sight_of(frame.centres, matches)
-        information = frame_information(settings.camera, settings.target.points_from_mass_m, sight, fit.pose)
-        if information is None:
-            return None
         return fit, matches, motion.update(information) + self._match_weight(matches, frame.centres)
 
     def _match_weight(self, matches: Matches, centres: Centres) -> float:
@@ -109,7 +106,7 @@ class MotionTracker:
         size = np.linalg.det(centres.covariances[matches.centre])
         return float(len(matches) * math.log(area) - np.log(2.0 * np.pi * np.sqrt(size)).sum())
 
-    def _solved(self, centres: Centres, pose: Pose, covariance: Floats) -> tuple[PoseFit, Matches] | None:
+    def _solved(self, centres: Centres, pose: Pose, covariance: Floats) -> Solved | None:
         settings = self._settings
         prior = PosePrior(pose, np.linalg.inv(covariance).astype(np.float64, copy=False))
         if centres.points is not None:
@@ -135,9 +132,7 @@ class MotionTracker:
                 return [(pose, near)]
         return match_jointly(camera, points, centres, pose, covariance)
 
-    def _fitted(
-        self, centres: Centres, matches: Matches, start: Pose, prior: PosePrior
-    ) -> tuple[PoseFit, Matches] | None:
+    def _fitted(self, centres: Centres, matches: Matches, start: Pose, prior: PosePrior) -> Solved | None:
         settings = self._settings
         if not (enough(matches, settings.target) or _is_decided(matches, prior)):
             return None
@@ -154,14 +149,14 @@ class MotionTracker:
         information = frame_information(settings.camera, points, sight, fit.pose)
         if information is None or information.cost > GATE * len(matches):
             return None
-        return PoseFit(fit.pose, fit.covariance, information.cost, fit.iterations, fit.converged), matches
+        return fit, matches, information
 
-    def _rematched(
-        self, centres: Centres, found: tuple[PoseFit, Matches], prior: PosePrior
-    ) -> tuple[PoseFit, Matches]:
+    def _rematched(self, centres: Centres, found: Solved, prior: PosePrior) -> Solved:
         """Take in centres that the pose explains now, and leave out those that it does not."""
         settings = self._settings
-        fit, matches = found
+        fit, matches, information = found
+        if len(matches) == len(settings.target) and information.cost < 5.0 * len(matches):
+            return found
         points = settings.target.points_from_mass_m
         rows = jacobian(settings.camera, points, fit.pose)
         spreads = rows @ fit.covariance @ rows.transpose(0, 2, 1)

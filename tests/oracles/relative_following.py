@@ -49,7 +49,7 @@ def frames_of(rows, sigma_px, labelled):
         if len(own):
             covariances = np.broadcast_to(sigma_px**2 * np.eye(2), (len(own), 2, 2))
             points = own[:, 2].astype(np.int64) if labelled else None
-            yield Frame(number, float(own[0, 1]), Centres(own[:, 3:5].copy(), covariances, points))
+            yield Frame(number, float(own[0, 1]), Centres(own[:, 3:5].copy(), covariances, points, sigma_px))
 
 
 def follow(scene, motion, seed, model=DEFAULT, clutter=0.0, missing=0.0, labelled=True, guessed=True, **more):

@@ -1,0 +1,1 @@
+"""Relative navigation on scenes that share nothing with it, beside other solvers."""
