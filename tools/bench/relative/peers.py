@@ -154,7 +154,8 @@ def _evolution(bench: Bench) -> list[Row]:
     times = float(np.median(scipy_ms) / np.median(ours_ms))
     note = (
         f"{np.median(ours_ms):.1f} ms against {np.median(scipy_ms):.0f} ms; "
-        f"population {SETTINGS.population}, F {SETTINGS.weight}, CR {SETTINGS.crossover}, at most {SETTINGS.generations} generations"
+        f"population {SETTINGS.population}, F {SETTINGS.weight}, CR {SETTINGS.crossover}, "
+        f"at most {SETTINGS.generations} generations"
     )
     return [
         at_least(
