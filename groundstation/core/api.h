@@ -65,6 +65,31 @@ int32_t gs_detect(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t 
 void gs_seams(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns, int32_t most_dn, int32_t *down,
               int32_t *across);
 
+/* ---- Round spots of a target: disks.c ---------------------------------------------------------------------------- */
+
+typedef struct {
+    double level_dn, noise_dn; /* of the background */
+    double height_dn;          /* of spots too small to tell; below zero: the most that any of their pixels has */
+    double margin_px, edge_px, large_edge_px, large_px, unresolved_px, rest_px;
+    int32_t iterations;
+} DiskSettings;
+
+/* Where a spot is, roughly. */
+typedef struct {
+    double u_px, v_px, radius_px;
+} RoughDisk;
+
+/* Python reads it as eight doubles; the spread is to be multiplied by the noise squared. */
+typedef struct {
+    double u_px, v_px, height_dn, radius_px;
+    double misfit; /* mean square of the residuals over the noise */
+    Symmetric spread_px2;
+} FittedDisk;
+
+/* Fit `count` spots of a grey picture, rows `stride` bytes apart; `found` has room for as many. */
+void gs_fit_disks(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns, const RoughDisk *rough,
+                  int32_t count, const DiskSettings *settings, FittedDisk *found);
+
 /* ---- Star identification and pose: star_*.c ----------------------------------------------------------------------
  *
  * All structures are filled by star_tracking/search.py, once per tracker but for the picture. Lengths are of the ceiling

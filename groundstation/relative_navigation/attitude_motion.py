@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 STEP_RAD = 0.3
 """A step turns no body farther: its error is then some 1e-5 rad, whatever the inertia."""
 MOST_STEPS = 400
+_EYE = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +70,7 @@ def turn_on(
     rates, up, normal = rates_rad_s, None, None
     if vertical is not None:
         up, normal = vertical.up_body, vertical.normal_body
-    eye = np.eye(3)
-    turned = np.broadcast_to(eye, (count, 3, 3))
+    turned = np.broadcast_to(_EYE, (count, 3, 3))
     angle_by_rate, rate_by_rate = np.zeros((count, 3, 3)), turned
     for _ in range(steps):
         begin = rates
@@ -87,11 +87,11 @@ def turn_on(
         step, k = _turn_and_cross(vector)
         back = step.transpose(0, 2, 1)
         if inertia_kg_m2 is None:
-            by_rate, ratio = h * (eye - 0.5 * k + k @ k / 6.0), turned if steps == 1 else eye
+            by_rate, ratio = h * (_EYE - 0.5 * k + k @ k / 6.0), turned if steps == 1 else _EYE
         else:
             w = h * _coupling(middle, inertia_kg_m2)
-            by_rate = h * (eye + 0.5 * (w - k) + (k @ k - k @ w + w @ w) / 6.0)
-            ratio = eye + w + 0.5 * (w @ w)
+            by_rate = h * (_EYE + 0.5 * (w - k) + (k @ k - k @ w + w @ w) / 6.0)
+            ratio = _EYE + w + 0.5 * (w @ w)
         if steps == 1:
             return Turned(rates, step, by_rate, ratio)
         angle_by_rate = back @ angle_by_rate + by_rate @ rate_by_rate
@@ -169,4 +169,4 @@ def _turn_and_cross(vectors: Floats) -> tuple[Floats, Floats]:
     square = np.maximum(np.einsum("mi,mi->m", vectors, vectors), 1e-24)
     angle = np.sqrt(square)
     a, b = np.sin(angle) / angle, 2.0 * np.square(np.sin(0.5 * angle)) / square
-    return np.eye(3) + a[:, None, None] * k + b[:, None, None] * (k @ k), k
+    return _EYE + a[:, None, None] * k + b[:, None, None] * (k @ k), k

@@ -26,8 +26,11 @@ axes, acceleration in orbital axes."""
 POSITION, TURN, VELOCITY, RATE, ACCELERATION = (slice(i, i + 3) for i in range(0, STATE, 3))
 
 
+_EYE = np.eye(3)
+
+
 def _fixed(_t_s: float) -> Floats:
-    return np.eye(3)
+    return _EYE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +128,7 @@ def advance(
     carried[:, VELOCITY, POSITION] = carry[3:, :3] @ begin.T
     carried[:, VELOCITY, VELOCITY] = carry[3:, 3:]
     carried[:, VELOCITY, ACCELERATION] = push[3:]
-    carried[:, ACCELERATION, ACCELERATION] = np.eye(3)
+    carried[:, ACCELERATION, ACCELERATION] = _EYE
     carried[:, TURN, TURN] = swing
     carried[:, TURN, RATE] = rotation @ turned.angle_by_rate
     carried[:, RATE, RATE] = turned.rate_by_rate
@@ -137,8 +140,7 @@ def noise_over(motions: Motions, noise: Unmodelled, camera_from_orbital: Floats,
     t = dt_s
     sight = motions.position_m @ camera_from_orbital
     sight = sight / np.linalg.norm(sight, axis=1, keepdims=True)
-    eye = np.eye(3)
-    change = noise.across[:, None, None] * eye + (noise.along - noise.across)[:, None, None] * (
+    change = noise.across[:, None, None] * _EYE + (noise.along - noise.across)[:, None, None] * (
         sight[:, :, None] * sight[:, None, :]
     )
     seen = camera_from_orbital @ change
@@ -150,9 +152,9 @@ def noise_over(motions: Motions, noise: Unmodelled, camera_from_orbital: Floats,
     added[:, VELOCITY, VELOCITY] = change * (t**3 / 3.0)
     added[:, VELOCITY, ACCELERATION] = change * (t**2 / 2.0)
     added[:, ACCELERATION, ACCELERATION] = change * t
-    added[:, TURN, TURN] = turn * eye * (t**3 / 3.0)
+    added[:, TURN, TURN] = turn * _EYE * (t**3 / 3.0)
     added[:, TURN, RATE] = turn * motions.rotation * (t**2 / 2.0)
-    added[:, RATE, RATE] = turn * eye * t
+    added[:, RATE, RATE] = turn * _EYE * t
     for one, other in (
         (POSITION, VELOCITY),
         (POSITION, ACCELERATION),

@@ -43,7 +43,7 @@ _OFFSETS = np.array(
     [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64
 )
 """Powers of `STEP` by member: of turning, along, across."""
-_EYE, _EYE6 = np.eye(STATE), np.eye(6)
+_EYE, _EYE6, _EYE3_HALF = np.eye(STATE), np.eye(6), 1.5 * np.eye(3)
 MEMORY = 0.97
 """Share of the evidence kept from frame to frame: some thirty frames count."""
 CLEARLY_BETTER = 1.2
@@ -231,7 +231,7 @@ class MotionFilter:
         motions = self._motions
         motions.position_m = motions.position_m + step[:, POSITION]
         rotation = turns(step[:, TURN]) @ motions.rotation
-        motions.rotation = rotation @ (1.5 * np.eye(3) - 0.5 * (rotation.transpose(0, 2, 1) @ rotation))
+        motions.rotation = rotation @ (_EYE3_HALF - 0.5 * (rotation.transpose(0, 2, 1) @ rotation))
         motions.velocity_m_s = motions.velocity_m_s + step[:, VELOCITY]
         motions.rate_rad_s = motions.rate_rad_s + step[:, RATE]
         motions.acceleration_m_s2 = motions.acceleration_m_s2 + step[:, ACCELERATION]

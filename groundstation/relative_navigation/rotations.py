@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+_EYE = np.eye(3)
 _SMALL_RAD = 1e-6
 """Below it the series of sine and cosine are exact to rounding."""
 
@@ -80,7 +81,7 @@ def angle_between(one: Floats, other: Floats) -> float:
 
 def orthonormal(matrix: Floats) -> Floats:
     """Return the nearest rotation to one with rounding: a step of Newton's iteration."""
-    found: Floats = matrix @ (1.5 * np.eye(3) - 0.5 * (matrix.T @ matrix))
+    found: Floats = matrix @ (1.5 * _EYE - 0.5 * (matrix.T @ matrix))
     return found
 
 
@@ -93,7 +94,7 @@ def turns(vectors_rad: Floats) -> Floats:
     x, y, z = vectors_rad.T
     zero = np.zeros_like(x)
     k = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    found: Floats = np.eye(3) + a[:, None, None] * k + b[:, None, None] * (k @ k)
+    found: Floats = _EYE + a[:, None, None] * k + b[:, None, None] * (k @ k)
     return found
 
 

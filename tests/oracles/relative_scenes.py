@@ -171,3 +171,43 @@ def bound(scene, rotation, position):
         columns.append((both[0] - both[1]) / (2.0 * step))
     rows = np.array(columns).T / scene.sigma_px
     return np.linalg.inv(rows.T @ rows)
+
+
+def in_orbit(
+    seed,
+    times,
+    rate=1.1068e-3,
+    nearest=3.0,
+    inertia=INERTIA,
+    offset_m=(0.1, 0.05, -0.2),
+    mass_body_m=(0.02, -0.03, 0.05),
+):
+    """A craft flying by Hill's equations, turned by gravity; the camera's craft keeps its attitude in orbit.
+
+    Its camera looks up. Inertial axes are the orbital ones at time 0.
+
+    Returns the motion of the body's origin and the keys of ``orbit`` and ``centre_of_mass_m``.
+    """
+    rng = np.random.default_rng(seed)
+    places, _ = orbit(times, [nearest, 0, 0], [0.01, 0.0, 0.002], rate)
+    camera_from_orbital = Rotation.from_matrix([[0, 1.0, 0], [0, 0, 1.0], [1.0, 0, 0]])  # z forward is up
+
+    def torque(t, inertial_from_body):
+        up = inertial_from_body.inv().apply([np.cos(rate * t), np.sin(rate * t), 0.0])
+        return 3 * rate**2 * np.cross(up, inertia * up)
+
+    start = Rotation.from_rotvec(rng.normal(0.0, 0.2, 3)) * Rotation.from_euler("y", 90, degrees=True)
+    inertial, rates = spin(times, start, rng.normal(0.0, 0.004, 3), inertia, torque)
+    orbital_from_inertial = Rotation.from_rotvec(np.c_[np.zeros((len(times), 2)), -rate * times])
+    rotations = camera_from_orbital * orbital_from_inertial * inertial
+    mass = camera_from_orbital.apply(places) - np.array(offset_m)
+    x, y, z, w = camera_from_orbital.as_quat()
+    keys = {
+        "orbit": {
+            "rate_rad_s": rate,
+            "camera_from_orbital_q": [w, x, y, z],
+            "camera_offset_m": list(offset_m),
+        },
+        "centre_of_mass_m": list(mass_body_m),
+    }
+    return Motion(times, rotations, mass - rotations.apply(mass_body_m), rates), keys

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from groundstation.relative_navigation.attitude_motion import Vertical, turn_on
 from groundstation.relative_navigation.hill import hill_constants, hill_response, hill_transition
+from groundstation.relative_navigation.hill_figure import draw_relative_orbit
 from groundstation.relative_navigation.motion import CameraCraft, Motions, advance
 from groundstation.relative_navigation.precession import AxialInertia, precess, precession_of, rate_after
 
@@ -164,3 +165,10 @@ def test_the_precession_of_the_published_stage():
         AxialInertia(3.0, 1.0)
     with pytest.raises(ValueError, match="does not turn"):
         precession_of(np.zeros(3), inertia)
+
+
+def test_pictures_of_a_bounded_and_of_a_wandering_orbit_say_which_they_are():
+    position = np.array([2.0, 0.0, 0.0])
+    for speed, words in ((-2.0 * RATE * 2.0, "bounded"), (0.0, "wanders")):
+        figure = draw_relative_orbit(position, np.array([0.0, speed, 0.0]), RATE, 2.0)
+        assert words in figure.axes[0].get_title()

@@ -126,3 +126,19 @@ def test_after_points_are_lost_the_truth_stays_within_the_growing_sigma():
     assert sigmas == sorted(sigmas)
     assert sigmas[-1] > 5.0 * sigmas[0]
     assert np.all(np.array(misses) < 4.0 * np.array(sigmas))
+
+
+def test_in_a_known_orbit_hill_and_gravity_carry_the_centre_of_mass():
+    """Camera and body away from their centres of mass; gravity turns the body by degrees meanwhile."""
+    squares, known, unknown = [], [], []
+    for seed in range(2):
+        motion, keys = scenes.in_orbit(seed, np.arange(0.0, 480.0, 4.0))
+        found = follow(scenes.Scene(), motion, seed, **keys)
+        assert set(found.statuses) == {"solved"}
+        squares.append(found.squares().mean())
+        known.append(found.ratio("position"))
+        unknown.append(follow(scenes.Scene(), motion, seed).ratio("position"))
+        assert np.abs(found.rate_errors[-1]).max() < 1e-4
+    assert 3.5 < np.mean(squares) < 8.5
+    assert np.mean(known) < 0.6
+    assert np.mean(known) < 1.05 * np.mean(unknown)
