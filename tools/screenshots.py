@@ -24,7 +24,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 from playwright.sync_api import Error as PageError
 from rich.console import Console
@@ -57,8 +56,6 @@ timeline = [
 limits = [{{ what = "least_edge_mm", vehicle = "alpha", above = 100.0 }}]
 """
 COLUMNS, LINES = 110, 56
-COLOURS = 128
-"""Of a picture: a third of the bytes, and nothing that an eye would miss."""
 TERMINAL_SVG = """<svg class="rich-terminal" viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg">
 <style>.{unique_id}-matrix {{ font-family: monospace; font-size: {char_height}px;
 line-height: {line_height}px; }} {styles}</style><defs><clipPath id="{unique_id}-clip-terminal">
@@ -103,8 +100,7 @@ class Photographer:
     def keep(self, page: Page, name: str) -> None:
         """Write a picture and close its page."""
         path = self._folder / f"{name}.png"
-        taken = Image.open(io.BytesIO(page.screenshot()))
-        taken.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+        page.screenshot(path=path)
         page.context.close()
         print(f"{path}", flush=True)
 
