@@ -28,12 +28,15 @@ def console(
 
     Example: groundstation console recordings/run.mcap --beside recordings/before.mcap
     """
-    from groundstation.console.replay import serve  # what only the server needs
+    from groundstation.console.replay import look_at  # what only the server needs
 
     access = console_access(HOST, port, None)
-    for line in access.greeting:
-        print(line, flush=True)
+
+    def greet() -> None:
+        for line in access.greeting:
+            print(line, flush=True)
+
     try:
-        serve(recording, beside, access)
+        look_at(recording, beside, access, greet)
     except RecordingError as error:
         raise UsageError(str(error)) from error

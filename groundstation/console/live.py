@@ -7,8 +7,6 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import uvicorn
-
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import RECORD, ZenohBus
 from groundstation.console.desk import Desk, Tokens
@@ -18,7 +16,8 @@ from groundstation.console.flown_ahead import FlownAhead
 from groundstation.console.limit_watch import LimitWatch
 from groundstation.console.options import Options
 from groundstation.console.rig_page import rig_page
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import Console
+from groundstation.console.serving import serve, server_of
 from groundstation.console.wizards import Wizards
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.names import CONSOLE
@@ -29,9 +28,8 @@ from groundstation.rig.read import parse_rig
 from groundstation.scenario.loading import Scenario, made
 
 MOST_BATCHES = 4096
-ALIVE_S, LOOK_S = 0.5, 0.02
+ALIVE_S = 0.5
 PICTURE_S = 1.0
-LISTEN_BACKLOG = 64
 
 
 class LiveSource:
@@ -105,24 +103,7 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
             rig, orders.rig_text, orders.rig_path.name, source.feed, desk, console.holder, console.hall.tell
         )
     )
-    access = options.access
-    server = uvicorn.Server(
-        uvicorn.Config(
-            make_app(console),
-            host=access.host,
-            port=access.port,
-            ssl_certfile=access.certificate or None,
-            ssl_keyfile=access.key or None,
-            log_level="warning",
-            access_log=False,
-            ws="websockets-sansio",
-            ws_per_message_deflate=False,
-            ws_max_size=100_000,
-            backlog=LISTEN_BACKLOG,
-            lifespan="on",
-            timeout_graceful_shutdown=1,
-        )
-    )
+    server = server_of(console)
     loop = asyncio.get_running_loop()
 
     def end() -> None:
@@ -132,25 +113,19 @@ async def _serve(rig: Rig, orders: Orders, options: Options, bus: ZenohBus, stop
         loop.call_soon_threadsafe(end)
 
     stop_when_asked(stop)
-    server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]  # the launcher asks
     tasks = [
-        asyncio.create_task(_report_life(bus, orders.process, server)),
+        asyncio.create_task(_report_life(bus, orders.process)),
         asyncio.create_task(_keep_pictures(console, desk)),
     ]
     try:
-        await server.serve()
-    except SystemExit as error:
-        raise UsageError(f"the console cannot listen at {access.address}: is the port taken?") from error
+        await serve(server, options.access.address, lambda: bus.announce(orders.process))
     finally:
         for task in tasks:
             task.cancel()
 
 
-async def _report_life(bus: ZenohBus, process: str, server: uvicorn.Server) -> None:
-    """Announce that it listens; from then on an empty batch is its sign of life."""
-    while not server.started:
-        await asyncio.sleep(LOOK_S)
-    bus.announce(process)
+async def _report_life(bus: ZenohBus, process: str) -> None:
+    """An empty batch is its sign of life."""
     while True:
         bus.publish_batch(process, RecordWriter().take())
         await asyncio.sleep(ALIVE_S)

@@ -3,12 +3,11 @@
 import asyncio
 import time
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import uvicorn
 
 from groundstation.bus.fields import Field
 from groundstation.console.access import Access
@@ -16,7 +15,8 @@ from groundstation.console.chart_tap import Samples, find_field
 from groundstation.console.events import Event, Events
 from groundstation.console.feed import Feed
 from groundstation.console.rig_page import rig_page
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import Console
+from groundstation.console.serving import serve, server_of
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Recorded as Keeping
@@ -222,27 +222,23 @@ def _at(track: Any, t_s: float) -> list[float]:  # noqa: ANN401 an array of four
     return [float(value) for value in track[place, 1:]]
 
 
-def serve(path: Path, other: Path | None, access: Access) -> None:
+def look_at(path: Path, other: Path | None, access: Access, listening: Callable[[], None]) -> None:
     """Serve a recording until Ctrl-C.
+
+    Args:
+        path: The recording.
+        other: Another one, laid over it; None for none.
+        access: How it is reached.
+        listening: Called once it is.
 
     Raises:
         RecordingError: It cannot be read.
+        UsageError: The port is taken.
     """
     recording = Recording(path)
     rig = recorded_rig(recording)
     source = ReplaySource(recording, rig, None if other is None else Recording(other))
-    console = Console(source, rig.tables, access)
-    config = uvicorn.Config(
-        make_app(console),
-        host=access.host,
-        port=access.port,
-        log_level="warning",
-        access_log=False,
-        ws="websockets-sansio",
-        ws_per_message_deflate=False,
-        timeout_graceful_shutdown=1,
-    )
     try:
-        asyncio.run(uvicorn.Server(config).serve())
+        asyncio.run(serve(server_of(Console(source, rig.tables, access)), access.address, listening))
     finally:
         source.close()

@@ -15,10 +15,14 @@ export class Camera {
   page(rig) {
     const names = Object.keys(rig.vehicles).filter((name) => rig.vehicles[name].stars);
     this.choice.replaceChildren(...names.map((name) => el("option", {value: name}, name)));
+    if (this.isShown) this.look(true);
     if (!names.length) set(document.getElementById("camera-words"), "No vehicle of this rig has a star camera.");
   }
 
-  look(isShown) { this.link.wish("camera", {type: "camera", vehicle: isShown ? this.choice.value : ""}); }
+  look(isShown) {
+    this.isShown = isShown;
+    this.link.wish("camera", {type: "camera", vehicle: isShown ? this.choice.value : ""});
+  }
 
   async take(head, blob) {
     const picture = await createImageBitmap(blob);
