@@ -6,6 +6,7 @@ import {age, clock, colour, deg, el, number, rad, set} from "./words.js";
 const MAIN = [["fly", "Fly"], ["brake", "Brake"], ["resume", "Resume"], ["land", "Land"], ["release", "Release"],
   ["arm", "Arm"], ["disarm", "Disarm"], ["float_on", "Float on"], ["float_off", "Float off"]];
 const FREE = new Set(["stop", "land", "disarm", "float_off", "brake"]);
+const FAR_S = 300;
 const LEASE_S = 600, RENEW_S = 240;
 
 export class Operation {
@@ -88,7 +89,7 @@ export class Operation {
       "x": number(v.x_m, 3, "m"), "heading": number(v.heading_rad === undefined ? null : deg(v.heading_rad), 1, "deg"),
       "y": number(v.y_m, 3, "m"), "speed": number(v.velocity_table_m_s ? 1000 * Math.hypot(...v.velocity_table_m_s) : null, 1, "mm/s"),
       "to goal": control && control.error_m !== null ? `${number(1000 * control.error_m, 1, "mm")}, ${number(deg(control.error_rad), 1, "deg")}` : "–", "fix": age(v.fusion?.fix_age_s),
-      "gas": v.valves?.pressure_pa ? number(v.valves.pressure_pa / 1e5, 1, "bar") : "–", "edge": look && look.time_to_edge_s !== null ? `in ${number(look.time_to_edge_s, 0, "s")}` : look ? "not on this way" : "–",
+      "gas": v.valves?.pressure_pa ? number(v.valves.pressure_pa / 1e5, 1, "bar") : "–", "edge": look && look.time_to_edge_s !== null && look.time_to_edge_s < FAR_S ? `in ${number(look.time_to_edge_s, 0, "s")}` : look ? "far" : "–",
       "air": v.valves ? v.valves.floating ? "on" : "off" : "–", "valves": v.valves ? v.valves.armed ? "armed" : "disarmed" : "–",
       "flies": control?.controller ?? "–", "limited": v.demand?.limited_by || "no",
     });
