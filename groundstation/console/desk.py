@@ -3,7 +3,6 @@
 import asyncio
 import hashlib
 import hmac
-import json
 import secrets
 import time
 from collections.abc import Callable, Mapping
@@ -212,6 +211,10 @@ class LeaseOffice:
             raise NotAllowedError(reason)
         return self._desk.tokens.of(name)
 
+    def holder_of(self, token: str) -> str:
+        """Whose token it is; empty for one that is none."""
+        return self._desk.tokens.name(token)
+
     async def give(self, token: str, to: str = "") -> None:
         """Give control up, or pass it on.
 
@@ -261,18 +264,3 @@ def checked_line(text: str) -> str:
     if not note:
         raise ArgumentError("mark: text is empty, expected a note")
     return str(note)
-
-
-def body_of(text: bytes) -> dict[str, object]:
-    """A JSON object that was posted.
-
-    Raises:
-        ValueError: It is none; the sentence says so.
-    """
-    try:
-        given = json.loads(text or b"{}")
-    except (ValueError, RecursionError):
-        raise ValueError("expected a JSON object") from None
-    if not isinstance(given, dict):
-        raise ValueError(f"expected a JSON object, found {type(given).__name__}")
-    return given

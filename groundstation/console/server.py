@@ -12,8 +12,9 @@ from fastapi.responses import JSONResponse, Response
 
 from groundstation.bus.fields import fields_of
 from groundstation.console.access import COOKIE, Access, Role
+from groundstation.console.body import LONGEST_BODY, body_of
 from groundstation.console.chart_tap import UnknownFieldError
-from groundstation.console.desk import Desk, LeaseOffice, NotAllowedError, body_of
+from groundstation.console.desk import Desk, LeaseOffice, NotAllowedError
 from groundstation.console.hall import Hall, Screen
 from groundstation.console.source import Source
 from groundstation.console.wire import json_frame, plain
@@ -37,8 +38,12 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
 }
-LONGEST_BODY = 100_000
 LEASE_S = 600.0
+SOMEBODY = "console"
+"""Who takes control without a name."""
+MOST_SCREENS = 64
+NOT_LET_IN, TOO_MANY = 4401, 4429
+"""Codes with which a socket is closed."""
 HEADER = "x-lease-token"
 Preview = Callable[[str, str, dict[str, object]], Awaitable[dict[str, Any]]]
 
@@ -136,7 +141,8 @@ def _guard(app: FastAPI, console: Console) -> None:
         foreign = access.foreign(headers)
         if foreign:
             return _refused(403, foreign)
-        if int(headers.get("content-length") or 0) > LONGEST_BODY:
+        length = headers.get("content-length", "0")
+        if not length.isdecimal() or int(length) > LONGEST_BODY:
             return _refused(413, f"a request has at most {LONGEST_BODY} bytes")
         token = request.query_params.get("token", "")
         role = access.role(headers, request.cookies.get(COOKIE, ""), token)
@@ -172,7 +178,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
         if console.desk is None:
             return _refused(409, "this is a recording: there is nothing to stop")
         try:
-            body = body_of(await request.body())
+            body = await body_of(request)
         except ValueError:
             body = {}  # whatever was posted, it was a press
         return JSONResponse(await _pressed(console, console.desk, body))
@@ -182,7 +188,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
         if console.desk is None or console.office is None:
             return _refused(409, "this is a recording: nothing can be asked for")
         try:
-            body = body_of(await request.body())
+            body = await body_of(request)
             vehicle, action = str(body.get("vehicle", "")), str(body.get("action", ""))
             arguments = body.get("arguments") or {}
             if not isinstance(arguments, dict):
@@ -202,7 +208,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
         if console.desk is None:
             return _refused(409, "this is a recording: it takes no more notes")
         try:
-            console.desk.mark(str(body_of(await request.body()).get("text") or ""))
+            console.desk.mark(str((await body_of(request)).get("text") or ""))
         except (ValueError, ArgumentError) as error:
             return _refused(400, str(error))
         return JSONResponse({"accepted": True, "reason": ""})
@@ -212,7 +218,7 @@ def _add_api(app: FastAPI, console: Console) -> None:
         if console.preview is None:
             return _refused(409, "this rig cannot be flown in virtual time: it has no emulated twin")
         try:
-            body = body_of(await request.body())
+            body = await body_of(request)
             arguments = body.get("arguments") or {}
             if not isinstance(arguments, dict):
                 raise ValueError("'arguments' is no JSON object")
@@ -231,13 +237,11 @@ def _add_lease(app: FastAPI, console: Console) -> None:
         if office is None:
             return _refused(409, "this is a recording: there is no control to take")
         try:
-            body = body_of(await request.body())
+            body = await body_of(request)
             token = _token(request, body)
             action = str(body.get("action", "take")).replace("-", "_").replace(" ", "_")
             if action == "take":
-                name = str(body.get("name") or "").strip()
-                if not name:
-                    raise ValueError("taking control needs a name: {'action': 'take', 'name': …}")
+                name = str(body.get("name") or office.holder_of(token) or SOMEBODY).strip()
                 for_s = body.get("for_s", LEASE_S)
                 if isinstance(for_s, bool) or not isinstance(for_s, int | float):
                     raise ValueError(f"for_s is {for_s!r:.40}, expected seconds")
@@ -247,7 +251,7 @@ def _add_lease(app: FastAPI, console: Console) -> None:
                 await office.give(token)
                 return JSONResponse({"accepted": True, "holder": ""})
             if action in ("pass_on", "pass"):
-                to = str(body.get("to") or "").strip()
+                to = str(body.get("to") or body.get("name") or "").strip()
                 if not to:
                     raise ValueError("passing control on needs 'to', a name")
                 await office.give(token, to)
@@ -287,7 +291,10 @@ def _socket(console: Console) -> Callable[[WebSocket], Awaitable[None]]:
             headers, socket.cookies.get(COOKIE, ""), socket.query_params.get("token", "")
         )
         if console.access.foreign(headers) or role is Role.NOBODY:
-            await socket.close(4401)
+            await socket.close(NOT_LET_IN)
+            return
+        if len(console.hall.screens) >= MOST_SCREENS:
+            await socket.close(TOO_MANY)
             return
         await socket.accept()
         screen = Screen(socket, may_command=role is Role.OPERATOR and console.desk is not None)
@@ -345,7 +352,8 @@ def _outcome(pressed: "asyncio.Task[dict[str, object]]") -> bytes:
 
 def _token(request: Request, body: dict[str, object]) -> str:
     """The lease's token: in the body, or in a header."""
-    return str(body.get("token") or request.headers.get(HEADER) or "")
+    bearer = request.headers.get("authorization", "").removeprefix("Bearer ").strip()
+    return str(body.get("token") or request.headers.get(HEADER) or bearer)
 
 
 def _refused(status: int, reason: str) -> Response:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, Response
 
-from groundstation.console.desk import NotAllowedError, body_of
+from groundstation.console.body import body_of
+from groundstation.console.desk import NotAllowedError
 from groundstation.console.wizards import asked_of
 from groundstation.files.errors import FileError
 
@@ -44,7 +45,7 @@ def add_wizard(
         if wizards is None or office is None:
             return refused(409, "this is a recording: nothing can be calibrated live")
         try:
-            body = body_of(await request.body())
+            body = await body_of(request)
             action = asked_of(body)
             author = office.author(NEEDS_CONTROL, token_of(request, body))
             if action == "accept":

@@ -118,3 +118,35 @@ def test_a_foreign_screen_is_closed(served: TestClient) -> None:
         served.websocket_connect("ws://127.0.0.1:8400/ws", headers={"origin": "http://evil.example"}),
     ):
         pass
+
+
+def test_what_is_posted_in_pieces_is_bounded_too(rig: Rig, source: HandSource) -> None:
+    def pieces():
+        for _ in range(300):
+            yield b"x" * 1000
+
+    async def none(vehicle: str, action: str, arguments: dict[str, object]) -> dict[str, object]:
+        raise AssertionError((vehicle, action, arguments))
+
+    app = make_app(Console(source, rig.tables, Access(), preview=none))
+    with TestClient(app, base_url="http://127.0.0.1:8400") as client:
+        found = client.post("/api/preview", content=pieces())
+        assert found.status_code == 400
+        assert "at most" in found.json()["reason"]
+        for wrong in (b"[1]", b"nonsense", b"[" * 50_000, b'{"arguments": 3}'):
+            assert client.post("/api/preview", content=wrong).status_code == 400
+
+
+def test_screens_are_a_bounded_number(served: TestClient) -> None:
+    from contextlib import ExitStack
+
+    from starlette.websockets import WebSocketDisconnect
+
+    with ExitStack() as stack:
+        for _ in range(64):
+            stack.enter_context(served.websocket_connect("ws://127.0.0.1:8400/ws"))
+        with pytest.raises(WebSocketDisconnect) as closed:
+            stack.enter_context(served.websocket_connect("ws://127.0.0.1:8400/ws"))
+        assert closed.value.code == 4429
+    with served.websocket_connect("ws://127.0.0.1:8400/ws") as socket:
+        assert socket.receive_bytes()
