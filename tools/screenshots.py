@@ -157,7 +157,7 @@ def photograph_recording(camera: Photographer) -> None:
 
 def take_control(page: Page) -> None:
     """As an operator does."""
-    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="As …").click()
     page.get_by_label("Your name").fill("anna")
     page.get_by_role("button", name="Take it").click()
     page.wait_for_function(

@@ -30,7 +30,7 @@ def served(tmp_path, monkeypatch):
 
 
 def take_control(page, name="anna"):
-    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="As …").click()
     page.get_by_label("Your name").fill(name)
     page.get_by_role("button", name="Take it").click()
     page.wait_for_function("() => document.getElementById('lease').textContent.startsWith('you hold')")

@@ -19,6 +19,7 @@ export class Operation {
     this.dialog = document.getElementById("lease-dialog");
     document.getElementById("take-control").onclick = () => this.control();
     document.getElementById("lease-take").onclick = () => this.take();
+    document.getElementById("lease-named").onclick = () => this.named();
     document.getElementById("marker-form").onsubmit = (event) => { event.preventDefault(); this.mark(); };
     setInterval(() => this.renew(), RENEW_S * 1000);
   }
@@ -173,20 +174,32 @@ export class Operation {
     this.table.clear();
   }
 
-  control() {
+  // one tap takes it, under the name of before or one of this screen's own; what refuses it opens the dialog
+  async control() {
     if (this.holds) { this.give(); return; }
+    const trouble = await this.takeAs(this.me || `operator-${Math.random().toString(36).slice(2, 6)}`, "");
+    if (trouble) this.named(trouble);
+  }
+
+  named(trouble = "") {
     document.getElementById("lease-name").value = this.me || "operator";
-    set(document.getElementById("lease-trouble"), "");
-    this.dialog.showModal();
+    set(document.getElementById("lease-trouble"), trouble);
+    if (!this.dialog.open) this.dialog.showModal();
   }
 
   async take() {
     const name = document.getElementById("lease-name").value.trim(), force = document.getElementById("lease-force").value.trim();
+    const trouble = await this.takeAs(name, force);
+    if (trouble) set(document.getElementById("lease-trouble"), trouble);
+    else this.dialog.close();
+  }
+
+  async takeAs(name, force) {
     const answer = await post("/api/lease", {action: "take", name, force, for_s: LEASE_S, token: this.token});
-    if (!answer.accepted) { set(document.getElementById("lease-trouble"), answer.reason); return; }
+    if (!answer.accepted) return answer.reason;
     localStorage.setItem("lease", answer.token);
     localStorage.setItem("lease-name", answer.holder);
-    this.dialog.close();
+    return "";
   }
 
   async give() {
