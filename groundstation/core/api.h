@@ -90,6 +90,41 @@ typedef struct {
 void gs_fit_disks(const uint8_t *image, ptrdiff_t stride, int32_t rows, int32_t columns, const RoughDisk *rough,
                   int32_t count, const DiskSettings *settings, FittedDisk *found);
 
+/* ---- Pose of a target: pose.c ------------------------------------------------------------------------------------ */
+
+typedef struct {
+    double f_px, cx_px, cy_px;
+} Pinhole;
+
+/* A point of the body and where it was seen; `weight` (2, 2) times an error has the covariance 1. */
+typedef struct {
+    double body_m[3], u_px, v_px, weight[4];
+} SeenPoint;
+
+/* Camera from body (3, 3) and the body's origin in camera axes; Python reads it as twelve doubles. */
+typedef struct {
+    double rotation[9], position_m[3];
+} RigidPose;
+
+typedef struct {
+    double rest, first_damping, most_damping, most_inflation, nearest_m;
+    int32_t iterations;
+} PoseSettings;
+
+/* Covariance (6, 6): position, then the turn in front, camera axes. */
+typedef struct {
+    RigidPose pose;
+    double covariance[36];
+    double cost;
+    int32_t iterations;
+} SolvedPose;
+
+/* The pose of least squares near `found->pose`; `mean` and `information` (6, 6) are a prior's, or NULL both.
+ *
+ * Returns whether it came to rest with every direction known; else the covariance is not written. */
+int32_t gs_solve_pose(const Pinhole *camera, const SeenPoint *seen, int32_t count, const RigidPose *mean,
+                      const double *information, const PoseSettings *settings, SolvedPose *found);
+
 /* ---- Star identification and pose: star_*.c ----------------------------------------------------------------------
  *
  * All structures are filled by star_tracking/search.py, once per tracker but for the picture. Lengths are of the ceiling
