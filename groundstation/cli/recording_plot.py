@@ -31,6 +31,8 @@ def plot(
 
     Example: groundstation recording plot run.mcap 'alpha/state.position_table_m[0]' --to-s 25 --out x.png
     """
+    if out.suffix.lower() != ".png":  # never a picture in the place of a recording
+        raise UsageError(f"{out} must end in .png: that is what is written")
     check_targets(out)
     try:
         with OpenedRecording(file) as recording:

@@ -103,7 +103,10 @@ class Access:
     def foreign(self, headers: Mapping[str, str]) -> str:
         """Why a request was not made by a page of this server, a sentence; empty if it may have been."""
         host = headers.get("host", "")
-        name = urlsplit(f"//{host}").hostname or ""
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+        except ValueError:
+            return f"{host!r:.60} is no address of this console"
         known = (*LOOPBACK, self.host, *self.names)
         if name not in known and self.host not in ("0.0.0.0", "::"):
             return f"this console does not go by the name {name!r:.60}"

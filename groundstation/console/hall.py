@@ -1,6 +1,7 @@
 """The screens that look on, and what each is sent; the heart of the server, without HTTP."""
 
 import asyncio
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,6 +15,7 @@ from groundstation.parts.operation.messages import Diagnostics, Latency
 from groundstation.parts.stars.messages import StarMatches, StarPicture
 from groundstation.recording.errors import RecordingError
 
+_LOG = logging.getLogger(__name__)
 STEP_S = 0.05
 HEALTH_STEPS, CHART_STEPS = 20, 2
 MOST_FIELDS = 40
@@ -121,9 +123,18 @@ class Hall:
     async def run(self) -> None:
         """Step until cancelled."""
         loop = asyncio.get_running_loop()
-        due_s = loop.time()
+        due_s, trouble = loop.time(), ""
         while True:
-            self.step()
+            try:
+                self.step()
+            except Exception as error:  # nothing that cannot be read ends what all screens are sent
+                if str(error) != trouble:
+                    trouble = str(error)
+                    _LOG.exception("what is shown cannot be read")
+                    for screen in self.screens:
+                        screen.client.append(json_frame({"type": "trouble", "text": trouble}))
+            else:
+                trouble = ""
             due_s = max(due_s + STEP_S, loop.time())
             await asyncio.sleep(due_s - loop.time())
 

@@ -23,12 +23,14 @@ from groundstation.declarations.topic import Recorded as Keeping
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.stars.messages import StarFix
 from groundstation.recording.columns import read_columns
+from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recorded, Recording
 from groundstation.rig.provenance import recorded_rig
 
 BEFORE_NS = 1_500_000_000
 """So far before a moment messages are read that a screen shows there; what comes rarely is in memory."""
 MOST_STEP_S = 0.5
+SLOWEST, FASTEST = 0.01, 100.0
 MOST_EVENTS, MOST_SHOWN = 1_000_000, 4000
 """Of a recording; beyond the second a screen is told of no fix that was used."""
 MOST_SAMPLES = 20_000
@@ -90,7 +92,11 @@ class ReplaySource:
         passed_s, self._looked_s = min(now_s - self._looked_s, MOST_STEP_S), now_s
         if self._is_playing:
             until_ns = self._place_ns + round(passed_s * self._factor * 1e9)
-            self._read(self._place_ns + 1, until_ns)
+            try:
+                self._read(self._place_ns + 1, until_ns)
+            except RecordingError:
+                self._is_playing = False  # a hole: it stays before it, and can be moved past it
+                raise
             self._place_ns = min(until_ns, self._recording.stop_ns)
             self._is_playing = self._place_ns < self._recording.stop_ns
         return self._place_ns
@@ -118,9 +124,11 @@ class ReplaySource:
         elif what == "pause":
             self._is_playing = False
         elif what == "speed":
-            self._factor = min(max(float(asked["factor"]), 0.01), 100.0)
+            self._factor = min(max(_number(asked, "factor"), SLOWEST), FASTEST)
         elif what == "seek":
-            self._seek(self._recording.start_ns + round(float(asked["t_s"]) * 1e9))
+            last_s = (self._recording.stop_ns - self._recording.start_ns) * 1e-9
+            place_s = min(max(_number(asked, "t_s"), 0.0), last_s + 1.0)
+            self._seek(self._recording.start_ns + round(place_s * 1e9))
         elif what in ("next_fault", "next_refused"):
             self._jump(what)
         else:
@@ -193,6 +201,18 @@ class ReplaySource:
             if self._payloads[key[0]] in rare:
                 found.append(message)
         return found
+
+
+def _number(asked: Mapping[str, Any], name: str) -> float:
+    """A number of a wish; infinity stands for the end.
+
+    Raises:
+        ValueError: It is none.
+    """
+    given = asked.get(name)
+    if isinstance(given, bool) or not isinstance(given, int | float) or given != given:
+        raise ValueError(f"{name} is {given!r:.40}, expected a number")
+    return float(min(max(given, -1e300), 1e300))
 
 
 def _column(found: Mapping[Any, Any], field: Field, payloads: Mapping[str, type[Message]]) -> Samples:

@@ -9,6 +9,7 @@ from typing import Any
 
 from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import JSONResponse, Response
+from starlette.exceptions import HTTPException
 
 from groundstation.bus.fields import fields_of
 from groundstation.console.access import COOKIE, Access, Role
@@ -22,6 +23,7 @@ from groundstation.console.wizard_api import add_wizard
 from groundstation.console.wizards import Wizards
 from groundstation.declarations.request import ArgumentError
 from groundstation.declarations.tables import Tables
+from groundstation.recording.errors import RecordingError
 
 PAGE = files("groundstation.console") / "page"
 TYPES = {
@@ -39,9 +41,12 @@ HEADERS = {
     "Cache-Control": "no-cache",
 }
 LEASE_S = 600.0
+MOST_S = 1e9
 SOMEBODY = "console"
 """Who takes control without a name."""
 MOST_SCREENS = 64
+MOST_DIGITS = 10
+"""Of a length that is told."""
 NOT_LET_IN, TOO_MANY = 4401, 4429
 """Codes with which a socket is closed."""
 HEADER = "x-lease-token"
@@ -142,17 +147,18 @@ def _guard(app: FastAPI, console: Console) -> None:
         if foreign:
             return _refused(403, foreign)
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > LONGEST_BODY:
+        if not length.isdecimal() or len(length) > MOST_DIGITS or int(length) > LONGEST_BODY:
             return _refused(413, f"a request has at most {LONGEST_BODY} bytes")
         token = request.query_params.get("token", "")
         role = access.role(headers, request.cookies.get(COOKIE, ""), token)
+        is_known = bool(access.operator and token) and access.role({}, "", token) is not Role.NOBODY
         if role is Role.NOBODY:
             return _refused(401, "this console wants a token: open the address that its run printed")
         if request.method == "POST" and role < Role.OPERATOR and request.url.path != "/api/stop":
             return _refused(403, "an observer may look on and press STOP; the operator's address may ask")
         response = await go_on(request)
         response.headers.update(HEADERS)
-        if token:
+        if is_known:  # a wrong one must not replace the right one of before
             secure = access.scheme == "https"
             response.set_cookie(COOKIE, token, httponly=True, samesite="strict", secure=secure)
         return response
@@ -160,6 +166,11 @@ def _guard(app: FastAPI, console: Console) -> None:
 
 def _add_api(app: FastAPI, console: Console) -> None:
     hall = console.hall
+
+    @app.exception_handler(HTTPException)
+    async def nothing_there(request: Request, error: HTTPException) -> Response:
+        path = request.url.path
+        return _refused(error.status_code, f"{request.method} {path!r:.60} is nothing that a console serves")
 
     @app.get("/api/state")
     async def state() -> Response:
@@ -243,7 +254,7 @@ def _add_lease(app: FastAPI, console: Console) -> None:
             if action == "take":
                 name = str(body.get("name") or office.holder_of(token) or SOMEBODY).strip()
                 for_s = body.get("for_s", LEASE_S)
-                if isinstance(for_s, bool) or not isinstance(for_s, int | float):
+                if isinstance(for_s, bool) or not isinstance(for_s, int | float) or abs(for_s) > MOST_S:
                     raise ValueError(f"for_s is {for_s!r:.40}, expected seconds")
                 fresh = await office.take(name, token, float(for_s), str(body.get("force") or ""))
                 return JSONResponse({"accepted": True, "token": fresh, "holder": name})
@@ -301,9 +312,12 @@ def _socket(console: Console) -> Callable[[WebSocket], Awaitable[None]]:
         console.hall.enter(screen)
         sending = asyncio.create_task(screen.client.send())
         try:
-            with suppress(WebSocketDisconnect, KeyError):  # the screen is gone, or sends what is no text
+            with suppress(WebSocketDisconnect):  # the screen is gone
                 while True:
-                    _obey(console, screen, await socket.receive_text())
+                    message = await socket.receive()
+                    if message["type"] == "websocket.disconnect":
+                        break
+                    _obey(console, screen, message.get("text"))
         finally:
             sending.cancel()
             console.hall.leave(screen)
@@ -311,17 +325,24 @@ def _socket(console: Console) -> Callable[[WebSocket], Awaitable[None]]:
     return serve
 
 
-def _obey(console: Console, screen: Screen, text: str) -> None:
-    """Do what a screen asks for."""
+def _obey(console: Console, screen: Screen, text: str | None) -> None:
+    """Do what a screen asks for; None is a frame of bytes, which is refused."""
     try:
-        asked = json.loads(text[:LONGEST_BODY])
-        what = asked["type"]
+        asked = _wish(text)
+        what = asked.get("type")
         if what == "stop":
-            if console.desk is not None:
+            if console.desk is None:
+                screen.client.append(
+                    json_frame({"type": "trouble", "text": "this is a recording: there is nothing to stop"})
+                )
+            else:
                 pressed = _pressed(console, console.desk, asked)
                 pressed.add_done_callback(lambda task: screen.client.append(_outcome(task)))
         elif what == "charts":
-            console.hall.show_charts(screen, tuple(str(name) for name in asked["fields"]))
+            names = asked.get("fields")
+            if not isinstance(names, list):
+                raise ValueError(f"fields is {names!r:.40}, expected a list of names")
+            console.hall.show_charts(screen, tuple(str(name) for name in names))
         elif what == "camera":
             vehicle = str(asked.get("vehicle") or "")
             screen.camera = vehicle if vehicle in console.source.vehicles else ""
@@ -331,10 +352,26 @@ def _obey(console: Console, screen: Screen, text: str) -> None:
             console.source.control(asked)
         else:
             raise ValueError(f"{what!r:.40} is nothing that a screen can ask for")
-    except UnknownFieldError as error:
+    except (UnknownFieldError, RecordingError) as error:
         screen.client.append(json_frame({"type": "trouble", "text": str(error)}))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        screen.client.append(json_frame({"type": "trouble", "text": f"not understood: {error}"}))
+    except (ValueError, RecursionError) as error:
+        why = "it is nested too deeply" if isinstance(error, RecursionError) else error
+        screen.client.append(json_frame({"type": "trouble", "text": f"not understood: {why}"}))
+
+
+def _wish(text: str | None) -> dict[str, Any]:
+    """The JSON object that a screen sent.
+
+    Raises:
+        ValueError: It is none.
+    """
+    try:
+        asked = json.loads("" if text is None else text[:LONGEST_BODY])
+    except ValueError:
+        raise ValueError("expected a JSON object as text") from None
+    if not isinstance(asked, dict):
+        raise ValueError(f"expected a JSON object, found {type(asked).__name__}")
+    return asked
 
 
 def _pressed(console: Console, desk: Desk, asked: Mapping[str, object]) -> "asyncio.Task[dict[str, object]]":

@@ -128,7 +128,7 @@ class Action:
         for name in given:
             if name not in known:
                 wanted = ", ".join(known) or "no arguments"
-                raise ArgumentError(f"{self.name} has no argument {name!r}: it takes {wanted}")
+                raise ArgumentError(f"{self.name} has no argument {_short(name)}: it takes {wanted}")
         values: dict[str, Value] = {}
         for name, argument in known.items():
             if name in given:

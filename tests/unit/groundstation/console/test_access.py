@@ -81,3 +81,8 @@ def test_a_token_shows_its_name_to_every_console_of_the_run_and_to_no_other(name
 @given(st.text(max_size=80))
 def test_what_is_no_token_shows_nobody(text: str) -> None:
     assert Tokens(b"one run").name(text) == ""
+
+
+@pytest.mark.parametrize("host", ["[", "[::1", "[x]"])
+def test_a_host_that_is_no_address_is_foreign(host: str) -> None:
+    assert Access().foreign({"host": host})

@@ -12,6 +12,7 @@ from groundstation.console.replay import ReplaySource
 from groundstation.console.server import Console, make_app
 from groundstation.console.state import vehicle_state
 from groundstation.parts.fusion.messages import VehicleState
+from groundstation.recording.errors import RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.rig.provenance import recorded_rig
 
@@ -120,3 +121,35 @@ def test_a_screen_over_a_recording_can_ask_for_nothing(source: ReplaySource) -> 
         assert client.get("/api/state").json()["replay"]["is_playing"] is False
         assert client.post("/api/stop").status_code == 409
         assert client.post("/api/request", json={"vehicle": "alpha", "action": "fly"}).status_code == 409
+
+
+@pytest.mark.parametrize("wrong", [math.nan, "nan", "1", None, True, [], {}])
+@pytest.mark.parametrize(("what", "name"), [("seek", "t_s"), ("speed", "factor")])
+def test_what_is_no_number_moves_nothing(source: ReplaySource, what: str, name: str, wrong: object) -> None:
+    with pytest.raises(ValueError, match=f"{name} is .*, expected a number"):
+        source.control({"what": what, name: wrong})
+    source.control({"what": "play"})
+    source.step()
+
+
+@pytest.mark.parametrize("wild", [1e308, -1e308, math.inf, -math.inf, 10**400, -1])
+def test_a_wild_number_means_the_end(source: ReplaySource, wild: float) -> None:
+    source.control({"what": "seek", "t_s": wild})
+    end_s = source.page["replay"]["duration_s"] if wild > 0 else 0.0
+    assert source.place_s == pytest.approx(end_s)
+    source.control({"what": "speed", "factor": wild})
+    assert source.extra()["replay"]["factor"] == (100.0 if wild > 0 else 0.01)
+
+
+def test_a_hole_in_the_recording_ends_the_playing_and_no_more(
+    source: ReplaySource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise RecordingError("a chunk is damaged")
+
+    source.control({"what": "play"})
+    monkeypatch.setattr(source, "_read", fails)
+    with pytest.raises(RecordingError):
+        source.step()
+    assert source.step() > 0
+    assert not source.extra()["replay"]["is_playing"]

@@ -150,3 +150,81 @@ def test_screens_are_a_bounded_number(served: TestClient) -> None:
         assert closed.value.code == 4429
     with served.websocket_connect("ws://127.0.0.1:8400/ws") as socket:
         assert socket.receive_bytes()
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [("GET", "/api/nothing", 404), ("PUT", "/api/state", 405), ("GET", "/ws", 404)],
+)
+def test_what_is_not_served_is_refused_with_a_reason(
+    served: TestClient, method: str, path: str, status: int
+) -> None:
+    found = served.request(method, path)
+    assert (found.status_code, found.json()["accepted"]) == (status, False)
+    assert found.json()["reason"]
+
+
+@pytest.mark.parametrize("token", ["%E2%82%AC", "%ff", "%00", "guessed"])
+def test_a_wrong_token_is_neither_an_error_nor_kept(
+    rig: Rig, source: HandSource, served: TestClient, token: str
+) -> None:
+    found = served.get(f"/api/state?token={token}")
+    assert (found.status_code, "set-cookie" in found.headers) == (200, False)
+    access = Access("192.168.1.5", 8400, (), "looks", "flies", "a.pem", "a.key")
+    app = make_app(Console(source, rig.tables, access))
+    with TestClient(app, base_url="https://192.168.1.5:8400") as client:
+        assert client.get("/api/state?token=flies").status_code == 200
+        assert client.get(f"/api/state?token={token}").status_code == 200
+        assert client.get("/api/state").status_code == 200  # by the cookie of before
+
+
+def test_a_length_of_thousands_of_digits_is_refused(served: TestClient) -> None:
+    found = served.post("/api/stop", content=b"{}", headers={"content-length": "9" * 5000})
+    assert found.status_code == 413
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        b"\x00\xff",
+        "",
+        "null",
+        "[]",
+        "{}",
+        '{"type":"charts"}',
+        '{"type":"charts","fields":"alpha/state.heading_rad"}',
+        '{"type":"ping","at":' + "[" * 20_000 + "]" * 20_000 + "}",
+        '{"type":"stop"}',
+    ],
+)
+def test_what_a_screen_cannot_ask_for_is_answered_and_leaves_it_open(
+    served: TestClient, wish: str | bytes
+) -> None:
+    with served.websocket_connect("ws://127.0.0.1:8400/ws") as socket:
+        if isinstance(wish, bytes):
+            socket.send_bytes(wish)
+        else:
+            socket.send_text(wish)
+        socket.send_text('{"type":"ping","at":1}')
+        answers: list[str] = []
+        while "pong" not in answers:
+            message = json.loads(socket.receive_bytes()[1:])
+            if message["type"] in ("trouble", "pong"):
+                answers.append(message["type"])
+                assert "subscriptable" not in message.get("text", "")
+        assert answers == ["trouble", "pong"]
+
+
+def test_a_step_that_fails_does_not_end_what_screens_are_sent(
+    served: TestClient, source: HandSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails() -> dict[str, object]:
+        raise RuntimeError("it cannot be read")
+
+    with served.websocket_connect("ws://127.0.0.1:8400/ws") as socket:
+        monkeypatch.setattr(source, "extra", fails)
+        while json.loads(socket.receive_bytes()[1:])["type"] != "trouble":
+            pass
+        monkeypatch.undo()
+        while json.loads(socket.receive_bytes()[1:])["type"] != "state":
+            pass
