@@ -24,7 +24,8 @@ from groundstation.launch.stop_button import EVERY, REPEAT_S, StopButton
 from groundstation.parts.scenario.messages import Marker
 
 ANSWER_S = 3.0
-MOST_TAPS = 200
+SAME_TAP_S, LONGEST_TAP = 10.0, 100
+"""A tap arrives by its second way within so long; later the same words are another press."""
 RIG = ""
 """Whom requests concern that are the rig's: the lease."""
 Ask = Callable[[str, str, Mapping[str, Value], str], "asyncio.Future[Ack]"]
@@ -85,7 +86,7 @@ class Desk:
         self._loop = asyncio.get_running_loop()
         self._button = StopButton(stop_bus, vehicles, "console")
         self._following: asyncio.Task[None] | None = None
-        self._taps: dict[str, asyncio.Task[dict[str, object]]] = {}
+        self._taps: dict[str, tuple[float, asyncio.Task[dict[str, object]]]] = {}
         bus.subscribe(key_of(Ack.TOPIC, "*"), self._receive)
 
     async def request(
@@ -115,9 +116,11 @@ class Desk:
             vehicle: Whom to stop; empty for all.
             tap: Of a screen that sends the same tap by two ways: it is one press. Empty: each call is one.
         """
-        known = self._taps.get(tap) if tap else None
-        if known is not None:
-            return known
+        now_s = time.monotonic()
+        self._taps = {key: row for key, row in self._taps.items() if now_s - row[0] < SAME_TAP_S}
+        tap = tap[:LONGEST_TAP]
+        if tap in self._taps:
+            return self._taps[tap][1]
         press = self._button.press(vehicle or EVERY, ANSWER_S)
         if self._following is None or self._following.done():
             self._following = asyncio.create_task(self._follow())
@@ -133,9 +136,7 @@ class Desk:
 
         task = asyncio.create_task(result())
         if tap:
-            self._taps[tap] = task
-            if len(self._taps) > MOST_TAPS:
-                del self._taps[next(iter(self._taps))]
+            self._taps[tap] = now_s, task
         return task
 
     def mark(self, text: str) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from groundstation.console.feed import Feed
 from groundstation.console.rig_page import rig_page
 from groundstation.console.server import Console
 from groundstation.console.serving import serve, server_of
+from groundstation.declarations.errors import UsageError
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.topic import Recorded as Keeping
@@ -80,6 +82,11 @@ class ReplaySource:
             },
         }
         self._seek(self._first_ns)
+
+    @property
+    def has_ghosts(self) -> bool:
+        """Whether another recording has anything to be laid over this one."""
+        return bool(self._ghosts)
 
     @property
     def place_s(self) -> float:
@@ -253,12 +260,16 @@ def look_at(path: Path, other: Path | None, access: Access, listening: Callable[
 
     Raises:
         RecordingError: It cannot be read.
-        UsageError: The port is taken.
+        UsageError: The port is taken, or the other recording has no vehicle of this one.
     """
-    recording = Recording(path)
-    rig = recorded_rig(recording)
-    source = ReplaySource(recording, rig, None if other is None else Recording(other))
-    try:
-        asyncio.run(serve(server_of(Console(source, rig.tables, access)), access.address, listening))
-    finally:
-        source.close()
+    with ExitStack() as opened:
+        beside = (
+            None if other is None else opened.enter_context(Recording(other))
+        )  # a wrong one is noticed at once
+        recording = opened.enter_context(Recording(path))
+        rig = recorded_rig(recording)
+        source = ReplaySource(recording, rig, beside)
+        if beside is not None and not source.has_ghosts:
+            raise UsageError(f"{other} has none of the vehicles of {path}: {', '.join(rig.vehicles)}")
+        with suppress(KeyboardInterrupt):  # how a person ends it
+            asyncio.run(serve(server_of(Console(source, rig.tables, access)), access.address, listening))
