@@ -85,6 +85,11 @@ class Listener:
         for kind in kinds:
             bus.subscribe(key_of(kind.TOPIC, owner), lambda *came: put(Remote(*came)))
 
+    @property
+    def has_some(self) -> bool:
+        """Whether anything waits to be taken."""
+        return not self._queue.empty()
+
     def take(self, timeout_s: float) -> Delivered | None:
         """The next message, waited for up to ``timeout_s``; None where none came that can be decoded."""
         try:

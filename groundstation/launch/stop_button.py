@@ -80,12 +80,15 @@ class StopButton:
     def follow(self, timeout_s: float = REPEAT_S) -> None:
         """Take what vehicles report, for a while at most; then repeat what is not acknowledged.
 
+        Args:
+            timeout_s: 0 takes what has come and waits for nothing: in an event loop.
+
         Raises:
             zenoh.ZError: The hub is gone.
         """
         until_s = time.monotonic() + timeout_s
-        while self._presses and (left_s := until_s - time.monotonic()) > 0:
-            delivered = self._rulings.take(left_s)
+        while self._presses and ((left_s := until_s - time.monotonic()) > 0 or self._rulings.has_some):
+            delivered = self._rulings.take(max(left_s, 0.0))
             if delivered is not None and isinstance(delivered.payload, Supervision):
                 self._acknowledge(delivered.payload)
         self._presses = [press for press in self._presses if press.is_pending]
