@@ -1,4 +1,4 @@
-"""Presses of the stop: repeated until every vehicle has taken them, whoever waits or does not wait for that."""
+"""Presses of the stop: repeated until every vehicle has taken them, whoever waits for that or does not."""
 
 import math
 import socket
