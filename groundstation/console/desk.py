@@ -23,7 +23,7 @@ from groundstation.launch.asking import publish, requests_of, silence
 from groundstation.launch.stop_button import EVERY, REPEAT_S, StopButton
 from groundstation.parts.scenario.messages import Marker
 
-ANSWER_S = 3.0
+ANSWER_S, LOOK_S = 3.0, 0.02
 SAME_TAP_S, LONGEST_TAP = 10.0, 100
 """A tap arrives by its second way within so long; later the same words are another press."""
 RIG = ""
@@ -210,6 +210,7 @@ class LeaseOffice:
         accepted, reason = await self._desk.request(RIG, "take_control", arguments, name)
         if not accepted:
             raise NotAllowedError(reason)
+        await self._until_held_by(name)
         return self._desk.tokens.of(name)
 
     def holder_of(self, token: str) -> str:
@@ -229,6 +230,7 @@ class LeaseOffice:
         if not accepted:
             raise NotAllowedError(reason)
         self._passed_to = (to, time.monotonic()) if to else None
+        await self._until_held_by(to)
 
     def author(self, action: str, token: str) -> str:
         """In whose name an action is asked for.
@@ -245,6 +247,12 @@ class LeaseOffice:
         if holder != name:
             raise NotAllowedError(f"control is held by {holder or 'nobody'}: take it first")
         return name
+
+    async def _until_held_by(self, name: str) -> None:
+        """Wait until the lease says so here, too: an answer comes sooner than what it changed."""
+        until_s = time.monotonic() + ANSWER_S
+        while self._holder() != name and time.monotonic() < until_s:
+            await asyncio.sleep(LOOK_S)
 
     def _was_passed(self, name: str) -> bool:
         """Whether control was passed on to this name from here, and nobody has shown up for it yet."""
