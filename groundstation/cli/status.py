@@ -57,7 +57,7 @@ def _look(run: RunningRig) -> dict[str, Any]:
             while time.monotonic() < until_s and not glance.is_complete:
                 for recorded in observer.take():
                     glance.take(recorded)
-                time.sleep(POLL_S)
+                time.sleep(POLL_S)  # a mailbox is looked into: no thread of Python waits for it
     except GroundStationError as error:
         return asdict(run) | {"trouble": str(error)}
     known = {"pid": run.pid, "rig": run.rig, "endpoint": run.endpoint}

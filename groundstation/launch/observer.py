@@ -110,4 +110,4 @@ def follow(run: RunningRig, pick: Pick, every_s: float, note: Callable[[str], No
                 looked_s = now_s
                 if run not in find_running():
                     return
-            time.sleep(POLL_S)
+            time.sleep(POLL_S)  # a mailbox is looked into: no thread of Python waits for it
