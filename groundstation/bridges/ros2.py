@@ -7,7 +7,6 @@ costs the flight nothing.
 Headers are given UTC, as ROS 2 nodes expect; other stamps stay of the host's monotonic clock.
 """
 
-import json
 import struct
 import sys
 import time
@@ -28,6 +27,7 @@ from groundstation.bridges.ros2_names import (
 )
 from groundstation.bus.journal import Journal
 from groundstation.bus.record_stream import Recorded
+from groundstation.bus.zenoh_bus import client_config
 from groundstation.declarations.message import Message
 from groundstation.declarations.names import ROS2
 from groundstation.launch.attendant import Attendant
@@ -162,7 +162,7 @@ class _Bridge:
         if self._publishers is not None or time.monotonic() < self._retry_s:
             return
         try:
-            session = zenoh.open(_config(self._endpoint))
+            session = zenoh.open(client_config(self._endpoint))
         except zenoh.ZError:
             self._retry_s = time.monotonic() + RETRY_S
             if not self._is_missed:
@@ -208,19 +208,6 @@ def run(orders: Orders) -> None:
         look_on(orders, bridge.take, latched, bridge.tick)
     finally:
         bridge.close()
-
-
-def _config(endpoint: str) -> zenoh.Config:
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "client",
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "connect/endpoints": [endpoint],
-        "transport/shared_memory/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
 
 
 def _say(line: str) -> None:

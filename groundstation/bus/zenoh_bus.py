@@ -61,6 +61,11 @@ def _config(mode: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...]
     return config
 
 
+def client_config(endpoint: str) -> zenoh.Config:
+    """Of a session that connects to one place and is found nowhere."""
+    return _config("client", connect=(endpoint,))
+
+
 def open_hub(
     endpoint: str, also_at: tuple[str, ...] = (), settings: Mapping[str, Any] = MappingProxyType({})
 ) -> zenoh.Session:
@@ -181,7 +186,7 @@ class ZenohBus:
         settings: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self._is_hub = is_hub
-        client = _config("client", connect=(endpoint,))
+        client = client_config(endpoint)
         self._session = (
             open_hub(endpoint, also_at, settings) if is_hub else _open("reached", endpoint, client)
         )
