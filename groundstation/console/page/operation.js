@@ -75,7 +75,8 @@ export class Operation {
     this.faults(state);
     this.scenario(state.scenario, state.limits);
     const recorder = state.recorder;
-    set(document.getElementById("recorder"), recorder && this.rig.kind === "live" ? `recording ${(recorder.written_bytes / 1e6).toFixed(1)} MB${recorder.room_s < 3600 ? `, room for ${clock(recorder.room_s)}` : ""}` : "");
+    const written = recorder ? `recording ${(recorder.written_bytes / 1e6).toFixed(1)} MB${recorder.room_s < 3600 ? `, room for ${clock(recorder.room_s)}` : ""}` : "";
+    set(document.getElementById("recorder"), this.rig.kind === "live" ? written : "a recording, not a flight");
   }
 
   vehicle(name, v) {
@@ -89,7 +90,7 @@ export class Operation {
     this.rows(own, {
       "x": number(v.x_m, 3, "m"), "heading": number(v.heading_rad === undefined ? null : deg(v.heading_rad), 1, "deg"),
       "y": number(v.y_m, 3, "m"), "speed": number(v.velocity_table_m_s ? 1000 * Math.hypot(...v.velocity_table_m_s) : null, 1, "mm/s"),
-      "to goal": control && control.error_m !== null ? `${number(1000 * control.error_m, 1, "mm")}, ${number(deg(control.error_rad), 1, "deg")}` : "–", "fix": age(v.fusion?.fix_age_s),
+      "to goal": control && control.error_m !== null ? `${number(1000 * control.error_m, control.error_m < 0.1 ? 1 : 0, "mm")}, ${number(deg(control.error_rad), 1, "deg")}` : "–", "fix": age(v.fusion?.fix_age_s),
       "gas": v.valves?.pressure_pa ? number(v.valves.pressure_pa / 1e5, 1, "bar") : "–", "edge": look && look.time_to_edge_s !== null && look.time_to_edge_s < FAR_S ? `in ${number(look.time_to_edge_s, 0, "s")}` : look ? "far" : "–",
       "air": v.valves ? v.valves.floating ? "on" : "off" : "–", "valves": v.valves ? v.valves.armed ? "armed" : "disarmed" : "–",
       "flies": control?.controller ?? "–", "limited": v.demand?.limited_by || "no",
