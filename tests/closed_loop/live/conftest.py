@@ -67,8 +67,8 @@ camera = { source = "fixes", rate_hz = 10.0, delay_s = 0.05 }
 class Run:
     """One run: what it says, its processes, its end."""
 
-    def __init__(self, rig, folder, *words, has_console=False):
-        self.recording = folder / "run.mcap"
+    def __init__(self, rig, folder, name, *words, has_console=False):
+        self.recording = folder / f"{name}.mcap"
         self.folder = folder
         self._env = os.environ | {
             "XDG_RUNTIME_DIR": str(folder),
@@ -216,7 +216,8 @@ def launch(tmp_path):
     runs = []
 
     def start(rig, *words, has_console=False):
-        runs.append(Run(rig, tmp_path, *words, has_console=has_console))
+        name = f"run_{len(runs) + 1}" if runs else "run"
+        runs.append(Run(rig, tmp_path, name, *words, has_console=has_console))
         return runs[-1]
 
     yield start
