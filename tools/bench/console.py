@@ -166,7 +166,7 @@ def _wait_for_words(page: Any, condition: str) -> None:  # noqa: ANN401 of Playw
 
 def _press(page: Any) -> None:  # noqa: ANN401 of Playwright
     page.get_by_role("button", name="STOP").click()
-    _wait_for_words(page, "each.textContent.includes('latched')")
+    _wait_for_words(page, "each.textContent.startsWith('stopped')")  # only then it can be released
     page.evaluate(
         """async () => {
           const post = async (path, body) => (await fetch(path, {method: 'POST',
