@@ -32,7 +32,7 @@ _NUMBERS = {"ignore_unknown_options": True}
 ALL, STOP = "all", "stop"
 FOR_ALL = ("stop", "land", "release", "fly", "disarm", "float_off")
 """Actions that all vehicles can be asked for at once."""
-OF_RIG = ("take_control", "give_control")
+OF_RIG = ("take_control", "give_control", "start_scenario")
 """Actions that concern the rig: asked for once, whatever vehicle is named."""
 
 app = typer.Typer(rich_markup_mode=None)

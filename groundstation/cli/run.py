@@ -63,6 +63,9 @@ def run(
     i_know: Annotated[
         str | None, typer.Option("--i-know", help="Fly although the dry run was refused: why.")
     ] = None,
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="t = 0 of a scenario waits for a person's start_scenario.")
+    ] = False,
     compare: Annotated[Path | None, typer.Option(help="Recording that the report lays beside.")] = None,
     hub_port: Annotated[
         int,
@@ -137,11 +140,23 @@ def run(
             scenario=(json.dumps(content), file.resolve()),
         )  # fmt: skip
         asked = Asked(
-            lockstep, headless, seed, record, report, compare, hardware, i_know, text, (*beside, *bridges)
+            lockstep,
+            headless,
+            seed,
+            record,
+            report,
+            compare,
+            hardware,
+            i_know,
+            text,
+            (*beside, *bridges),
+            by_hand,
         )
         raise typer.Exit(run_scenario(scenario, asked))
     if hardware is not None or i_know is not None:
         raise UsageError("--hardware and --i-know go with a scenario: a rig file flies on what it names")
+    if by_hand:
+        raise UsageError("--by-hand goes with a scenario: a rig has no timeline to start")
     loaded = parse_rig(text, file)
     if record is not None:
         check_new_recording(record)

@@ -42,6 +42,7 @@ class Asked:
     text: str
     """Of the scenario's file."""
     attendants: tuple[Attendant, ...] = ()
+    by_hand: bool = False
 
 
 def run_scenario(scenario: Scenario, asked: Asked) -> int:
@@ -56,6 +57,8 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
         raise UsageError("--i-know goes with --hardware: only there a dry run can refuse")
     if asked.i_know is not None and not (asked.i_know.strip() and asked.i_know.isprintable()):
         raise UsageError("--i-know needs a reason in words, on one line: it is recorded")
+    if asked.by_hand and asked.lockstep:
+        raise UsageError("--by-hand goes with real time: in virtual time nobody can start it")
     if asked.record is not None:
         check_new_recording(asked.record)
     if asked.report is not None:
@@ -66,6 +69,8 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
     else:
         check_failures(scenario)
         check_dispersions(scenario)
+    if asked.by_hand:
+        scenario = scenario.started_by_hand()
     try:
         judged = _flown(scenario, asked, seed)
     except UsageError:

@@ -1,62 +1,33 @@
-"""What people ask for at the console: requests and their answers, the lease, the stop."""
+"""What people ask for at the console: requests and their answers, notes, the stop."""
 
 import asyncio
-import hashlib
-import hmac
-import secrets
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.zenoh_bus import ZenohBus, key_of
-from groundstation.declarations.lease import FREE_FOR_ALL
+from groundstation.console.tokens import Tokens
 from groundstation.declarations.request import (
     Ack,
     Action,
     Argument,
     ArgumentError,
     Request,
-    Value,
     checked_name,
 )
 from groundstation.launch.asking import publish, requests_of, silence
 from groundstation.launch.stop_button import EVERY, REPEAT_S, StopButton
 from groundstation.parts.scenario.messages import Marker
 
-ANSWER_S, LOOK_S = 3.0, 0.02
+ANSWER_S = 3.0
 SAME_TAP_S, LONGEST_TAP = 10.0, 100
 """A tap arrives by its second way within so long; later the same words are another press."""
 RIG = ""
 """Whom requests concern that are the rig's: the lease."""
-Ask = Callable[[str, str, Mapping[str, Value], str], "asyncio.Future[Ack]"]
 
 
 class NotAllowedError(Exception):
     """Somebody may not ask for this; the sentence says what would change that."""
-
-
-class Tokens:
-    """Who holds control shows it by a token, which no console has to remember: another one accepts it, too.
-
-    Args:
-        secret: Of this run.
-    """
-
-    def __init__(self, secret: bytes) -> None:
-        self._secret = secret
-
-    def of(self, name: str) -> str:
-        """The token of a name."""
-        mark = hmac.new(self._secret, name.encode(), hashlib.sha256).hexdigest()
-        return f"{name.encode().hex()}.{mark}"
-
-    def name(self, token: str) -> str:
-        """The name of a token; empty for one that is none."""
-        try:
-            name = bytes.fromhex(token.partition(".")[0]).decode()
-        except ValueError:
-            return ""
-        return name if secrets.compare_digest(token.encode(), self.of(name).encode()) else ""
 
 
 class Desk:
@@ -178,89 +149,6 @@ class Desk:
         waiting = self._waiting.get((ack.request_id, ack.author, ack.vehicle))
         if waiting is not None and not waiting.done():
             waiting.set_result(ack)
-
-
-class LeaseOffice:
-    """Takes, renews, gives up and passes on control in the name of people at screens.
-
-    Args:
-        desk: To ask at.
-        holder: Who holds control now; empty for nobody.
-    """
-
-    def __init__(self, desk: Desk, holder: Callable[[], str]) -> None:
-        self._desk = desk
-        self._holder = holder
-        self._passed_to: tuple[str, float] | None = None
-
-    async def take(self, name: str, token: str, for_s: float, force: str) -> str:
-        """Take control, or keep it; the token that shows it.
-
-        Raises:
-            NotAllowedError: Somebody else has it, or somebody of this name at another screen.
-        """
-        holder = self._holder()
-        if name and holder == name and self._desk.tokens.name(token) != name and not self._was_passed(name):
-            raise NotAllowedError(
-                f"control is held by somebody of the name {name!r} at another screen: choose another name"
-            )
-        arguments: dict[str, object] = {"for_s": for_s}
-        if force:
-            arguments["force"] = force
-        accepted, reason = await self._desk.request(RIG, "take_control", arguments, name)
-        if not accepted:
-            raise NotAllowedError(reason)
-        await self._until_held_by(name)
-        return self._desk.tokens.of(name)
-
-    def holder_of(self, token: str) -> str:
-        """Whose token it is; empty for one that is none."""
-        return self._desk.tokens.name(token)
-
-    async def give(self, token: str, to: str = "") -> None:
-        """Give control up, or pass it on.
-
-        Raises:
-            NotAllowedError: It is not held by whom the token shows.
-        """
-        name = self._desk.tokens.name(token)
-        if not name:
-            raise NotAllowedError("this token shows nobody's control: take control first")
-        accepted, reason = await self._desk.request(RIG, "give_control", {"to": to}, name)
-        if not accepted:
-            raise NotAllowedError(reason)
-        self._passed_to = (to, time.monotonic()) if to else None
-        await self._until_held_by(to)
-
-    def author(self, action: str, token: str) -> str:
-        """In whose name an action is asked for.
-
-        Raises:
-            NotAllowedError: The action needs control, and the token does not show it.
-        """
-        name = self._desk.tokens.name(token)
-        if action in FREE_FOR_ALL:
-            return name or "console"
-        if not name:
-            raise NotAllowedError("take control first: only who holds it may ask for this")
-        holder = self._holder()
-        if holder != name:
-            raise NotAllowedError(f"control is held by {holder or 'nobody'}: take it first")
-        return name
-
-    async def _until_held_by(self, name: str) -> None:
-        """Wait until the lease says so here, too: an answer comes sooner than what it changed."""
-        until_s = time.monotonic() + ANSWER_S
-        while self._holder() != name and time.monotonic() < until_s:
-            await asyncio.sleep(LOOK_S)
-
-    def _was_passed(self, name: str) -> bool:
-        """Whether control was passed on to this name from here, and nobody has shown up for it yet."""
-        passed = self._passed_to
-        if passed is None or passed[0] != name:
-            return False
-        self._passed_to = None
-        return True
 
 
 def checked_line(text: str) -> str:

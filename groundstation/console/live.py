@@ -9,15 +9,16 @@ from typing import Any
 
 from groundstation.bus.record_stream import RecordWriter
 from groundstation.bus.zenoh_bus import RECORD, ZenohBus
-from groundstation.console.desk import Desk, Tokens
+from groundstation.console.desk import Desk
 from groundstation.console.events import Events
 from groundstation.console.feed import Feed
 from groundstation.console.flown_ahead import FlownAhead
 from groundstation.console.limit_watch import LimitWatch
 from groundstation.console.options import Options
 from groundstation.console.rig_page import rig_page
-from groundstation.console.server import Console
 from groundstation.console.serving import serve, server_of
+from groundstation.console.shown_console import Console
+from groundstation.console.tokens import Tokens
 from groundstation.console.wizards import Wizards
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.names import CONSOLE

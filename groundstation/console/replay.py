@@ -16,8 +16,8 @@ from groundstation.console.chart_tap import Samples, find_field
 from groundstation.console.events import Event, Events
 from groundstation.console.feed import Feed
 from groundstation.console.rig_page import rig_page
-from groundstation.console.server import Console
 from groundstation.console.serving import serve, server_of
+from groundstation.console.shown_console import Console
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig

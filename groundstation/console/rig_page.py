@@ -11,6 +11,7 @@ from groundstation.control.controllers import controllers
 from groundstation.declarations.request import Action, Argument
 from groundstation.declarations.rig import MOCK_UP_RADIUS_M, Rig
 from groundstation.parts.control.sections import control_of, neighbours_of
+from groundstation.parts.scenario.sections import ScenarioOfRig
 from groundstation.parts.stars.sections import StarsOfType
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.rays import ceiling_points
@@ -23,10 +24,11 @@ EDGE_POINTS = 6
 
 def rig_page(rig: Rig) -> dict[str, Any]:
     """The rig as JSON: table, vehicles, stars, actions, controllers, faults; SI and radians."""
-    table = rig.table
+    table, scenario = rig.table, rig.section(ScenarioOfRig).scenario
     return {
         "name": rig.name,
         "is_emulated": rig.laboratory is not None,
+        "starts_by_hand": scenario is not None and scenario.by_hand,
         "table": {
             "x_m": [table.x_min_m, table.x_max_m],
             "y_m": [table.y_min_m, table.y_max_m],
@@ -40,7 +42,12 @@ def rig_page(rig: Rig) -> dict[str, Any]:
         "vehicles": {name: _vehicle(rig, name) for name in rig.vehicles},
         "actions": {name: _action(action) for name, action in rig.tables.actions.items()},
         "controllers": {
-            name: {"summary": row.summary, "parameters": _schema(row.config)}
+            name: {
+                "summary": row.summary,
+                "parameters": _schema(row.config),
+                "has_program": row.has_program,
+                "can_be_chosen": row.is_built_in and not row.is_planned_together,
+            }
             for name, row in sorted(controllers().items())
         },
         "faults": {

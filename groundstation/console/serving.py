@@ -5,7 +5,9 @@ from collections.abc import Callable
 
 import uvicorn
 
-from groundstation.console.server import Console, make_app
+from groundstation.console.impatient import ImpatientProtocol
+from groundstation.console.server import make_app
+from groundstation.console.shown_console import Console
 from groundstation.declarations.errors import UsageError
 
 LISTEN_BACKLOG = 64
@@ -25,6 +27,7 @@ def server_of(console: Console) -> uvicorn.Server:
             ssl_keyfile=access.key or None,
             log_level="warning",
             access_log=False,
+            http=ImpatientProtocol,
             ws="websockets-sansio",
             ws_per_message_deflate=False,
             ws_max_size=LONGEST_MESSAGE,

@@ -1,37 +1,20 @@
 """``/api/wizard``: what goes on; start, accept or discard a guided calibration, for whoever holds control."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, Response
 
-from groundstation.console.body import body_of
+from groundstation.console.body import body_of, refused, text_of, token_of
 from groundstation.console.desk import NotAllowedError
+from groundstation.console.shown_console import Console
 from groundstation.console.wizards import asked_of
 from groundstation.files.errors import FileError
-
-if TYPE_CHECKING:
-    from groundstation.console.server import Console
 
 NEEDS_CONTROL = "go_to"
 """Who may send a vehicle somewhere may calibrate it."""
 
 
-def add_wizard(
-    app: FastAPI,
-    console: "Console",
-    token_of: Callable[[Request, dict[str, object]], str],
-    refused: Callable[[int, str], Response],
-) -> None:
-    """Add the route.
-
-    Args:
-        app: To.
-        console: Of.
-        token_of: The lease's token in a request.
-        refused: An answer with a reason.
-    """
+def add_wizard(app: FastAPI, console: Console) -> None:
+    """Add the routes."""
 
     @app.get("/api/wizard")
     async def shown() -> Response:
@@ -54,8 +37,8 @@ def add_wizard(
                 wizards.discard(author)
             else:
                 wizards.start(
-                    str(body.get("name", "")),
-                    str(body.get("vehicle", "")),
+                    text_of(body, "name"),
+                    text_of(body, "vehicle"),
                     author,
                     is_driven=body.get("drive") is True,
                 )

@@ -251,7 +251,7 @@ def asked_of(body: Mapping[str, Any]) -> str:
     Raises:
         ValueError: It is nothing that can be.
     """
-    action = str(body.get("action", ""))
-    if action not in ("start", "accept", "discard"):
+    action = body.get("action")
+    if not isinstance(action, str) or action not in ("start", "accept", "discard"):
         raise ValueError(f"action is {action!r:.40}, expected start, accept or discard")
     return action

@@ -84,6 +84,11 @@ class ControllerRow(Generic[ConfigT]):
     has_program: bool = False
     is_built_in: bool = False
 
+    @property
+    def is_planned_together(self) -> bool:
+        """Its parameters depend on what all ships of the rig do when they begin."""
+        return self.of_rig is not _nothing
+
     def build(
         self, parameters: Mapping[str, Any], vehicle: VehicleModel, keep_in: KeepIn | None
     ) -> Controller:

@@ -125,6 +125,36 @@ typedef struct {
 int32_t gs_solve_pose(const Pinhole *camera, const SeenPoint *seen, int32_t count, const RigidPose *mean,
                       const double *information, const PoseSettings *settings, SolvedPose *found);
 
+/* ---- Bodies between frames, and a filter's members: attitude.c, motion_bank.c ------------------------------------ */
+
+/* Let m bodies turn freely over a span: rates (m, 3) in body axes, principal `inertia` (3) or NULL where rates stay in
+ * the body; `up` and `normal` (m, 3), the orbit's axes in the body, for gravity gradient at its rate, or NULL both.
+ * No step turns a body by more than `step_rad`. Answered: rates at the end; turns (m, 3, 3), body at the end to body at
+ * the beginning; derivatives of the small turn at the end and of the rate by the rate at the beginning, (m, 3, 3). */
+void gs_turn_on(int64_t m, const double *rates, const double *inertia, double dt_s, const double *up,
+                const double *normal, double orbital_rate, double step_rad, int64_t most_steps, double *rates_after,
+                double *turns, double *angle_by_rate, double *rate_by_rate);
+
+/* A span between two frames, of the camera's craft: motion.CameraCraft. */
+typedef struct {
+    double begin[9], end[9], swing[9]; /* camera from orbital, at both ends; the camera's turn in inertial space */
+    double carry[36], push[18];        /* Hill's transition, and what a constant acceleration adds */
+    double camera_m[3];                /* from the craft's centre of mass */
+    double dt_s, orbital_rate, inertia[3], step_rad;
+    int64_t has_inertia, most_steps;
+} Span;
+
+/* A member's state: rotation (3, 3) camera from body, position, velocity, rate, acceleration. */
+enum { MEMBER = 21, MEMBER_ERRORS = 15 };
+
+/* Carry members (m, MEMBER) and their covariances (m, 15, 15) over a span, in place. `densities` (m, 3) of what is
+ * unmodelled: turning, along the line of sight, across it. */
+void gs_bank_predict(const Span *span, int64_t m, double *states, double *covariance, const double *densities);
+
+/* Correct members by the information of a frame: pose, I (6, 6), b (6), cost; `likelihood` (m) is answered. */
+void gs_bank_update(const RigidPose *pose, const double *information, const double *gradient, double cost, int64_t m,
+                    double *states, double *covariance, double *likelihood);
+
 /* ---- Star identification and pose: star_*.c ----------------------------------------------------------------------
  *
  * All structures are filled by star_tracking/search.py, once per tracker but for the picture. Lengths are of the ceiling

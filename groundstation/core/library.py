@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, sources_sha256
 
 
@@ -26,6 +29,10 @@ class Core:
     name: str
     lib: Any
     ffi: Any
+
+    def doubles(self, array: NDArray[np.float64] | None) -> Any:  # noqa: ANN401 - a pointer of cffi's
+        """The numbers of an array as a function of the core takes them: whole in memory, row by row."""
+        return self.ffi.NULL if array is None else self.ffi.from_buffer("double[]", array)
 
 
 def load_core(folder: Path) -> Core:

@@ -1,12 +1,11 @@
 /* The pose of least squares by Levenberg and Marquardt; in NumPy: tests/oracles/levenberg.py. */
 #include "core.h"
+#include "rotation.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { N = 6 };
-
-static const double small_rad = 1e-6;
 
 typedef struct {
     const Pinhole *camera;
@@ -16,51 +15,6 @@ typedef struct {
     const double *information; /* (6, 6) */
     const PoseSettings *settings;
 } Problem;
-
-/* Rotation by a vector (axis times angle). */
-static void turn(const double v[3], double out[9])
-{
-    const double x = v[0], y = v[1], z = v[2], angle = sqrt(x * x + y * y + z * z);
-    double a = 1.0, b = 0.5, c = 1.0 - 0.5 * angle * angle;
-    if (angle >= small_rad) {
-        const double half = sin(0.5 * angle) / angle;
-        a = sin(angle) / angle;
-        b = 2.0 * half * half;
-        c = cos(angle);
-    }
-    const double found[9] = {c + b * x * x,     b * x * y - a * z, b * x * z + a * y,
-                             b * x * y + a * z, c + b * y * y,     b * y * z - a * x,
-                             b * x * z - a * y, b * y * z + a * x, c + b * z * z};
-    memcpy(out, found, sizeof found);
-}
-
-/* Rotation vector of one * other', its length at most pi. */
-static void turn_between(const double one[9], const double other[9], double out[3])
-{
-    double m[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            m[3 * i + j] = 0.0;
-            for (int k = 0; k < 3; k++) m[3 * i + j] += one[3 * i + k] * other[3 * j + k];
-        }
-    const double a = m[0], e = m[4], i = m[8];
-    double q[4];
-    if (a + e + i > 0.0) {
-        q[0] = 1.0 + a + e + i, q[1] = m[7] - m[5], q[2] = m[2] - m[6], q[3] = m[3] - m[1];
-    } else if (a >= e && a >= i) {
-        q[0] = m[7] - m[5], q[1] = 1.0 + a - e - i, q[2] = m[1] + m[3], q[3] = m[2] + m[6];
-    } else if (e >= i) {
-        q[0] = m[2] - m[6], q[1] = m[1] + m[3], q[2] = 1.0 - a + e - i, q[3] = m[5] + m[7];
-    } else {
-        q[0] = m[3] - m[1], q[1] = m[2] + m[6], q[2] = m[5] + m[7], q[3] = 1.0 - a - e + i;
-    }
-    double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (q[0] < 0.0) size = -size;
-    for (int k = 0; k < 4; k++) q[k] /= size;
-    const double sine = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const double scale = sine < small_rad ? 2.0 / q[0] : 2.0 * atan2(sine, q[0]) / sine;
-    for (int k = 0; k < 3; k++) out[k] = scale * q[1 + k];
-}
 
 static RigidPose moved(const RigidPose *pose, const double step[N])
 {

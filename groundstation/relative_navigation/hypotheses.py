@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.relative_navigation.motion_filter import FrameInformation, MotionFilter
+from groundstation.relative_navigation.motion_bank import FrameInformation
+from groundstation.relative_navigation.motion_filter import MotionFilter
 from groundstation.relative_navigation.pinhole import PinholeCamera
 from groundstation.relative_navigation.pixel_equations import whitened
 from groundstation.relative_navigation.pose import Pose, Sight

@@ -18,21 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.relative_navigation.motion import (
-    ACCELERATION,
-    POSITION,
-    RATE,
-    STATE,
-    TURN,
-    VELOCITY,
-    CameraCraft,
-    Motions,
-    Unmodelled,
-    advance,
-    noise_over,
-)
+from groundstation.relative_navigation.motion import ACCELERATION, RATE, STATE, VELOCITY, CameraCraft
+from groundstation.relative_navigation.motion_bank import PLACE, SPEED, SPIN, FrameInformation, MotionBank
 from groundstation.relative_navigation.pose import Pose
-from groundstation.relative_navigation.rotations import rotation_vectors, turns
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +31,6 @@ _OFFSETS = np.array(
     [[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64
 )
 """Powers of `STEP` by member: of turning, along, across."""
-_EYE, _EYE6, _EYE3_HALF = np.eye(STATE), np.eye(6), 1.5 * np.eye(3)
 MEMORY = 0.97
 """Share of the evidence kept from frame to frame: some thirty frames count."""
 CLEARLY_BETTER = 1.2
@@ -55,23 +42,6 @@ TURN_FRAMES, ALONG_FRAMES, ACROSS_FRAMES = 12.0, 8.0, 2.0
 SURPRISE = 25.0
 """Squared miss of a prediction in sigmas, three numbers or fewer, at which that motion is believed less."""
 MOST_REOPENINGS = 12
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameInformation:
-    """What a frame says: the log of its likelihood is ``-(d I d - 2 b d + cost)/2`` for errors d of a pose.
-
-    Attributes:
-        pose: Where it was taken; of the centre of mass.
-        information: I, (6, 6).
-        gradient: b, (6,).
-        cost: Sum of squares of the whitened residuals there.
-    """
-
-    pose: Pose
-    information: Floats
-    gradient: Floats
-    cost: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,24 +78,15 @@ class MotionFilter:
         self.t_s = t_s
         self.frames = 1
         self._craft, self._inertia = craft, inertia_kg_m2
-        zeros = np.zeros((MEMBERS, 3))
-        self._motions = Motions(
-            np.broadcast_to(first.camera_from_body, (MEMBERS, 3, 3)).copy(),
-            zeros + first.position_camera_m,
-            zeros.copy(),
-            zeros.copy(),
-            zeros.copy(),
-        )
+        self._bank = MotionBank.at(MEMBERS, first, covariance)
         if craft.orbital_rate_rad_s > 0.0:  # a camera that keeps still in the orbital frame sees it turn
-            self._motions.rate_rad_s += first.camera_from_body.T @ (
+            self._bank.states[:, SPIN] = first.camera_from_body.T @ (
                 craft.camera_from_orbital(t_s) @ np.array((0.0, 0.0, craft.orbital_rate_rad_s))
             )
-        self._covariance = np.zeros((MEMBERS, STATE, STATE))
-        self._covariance[:, :6, :6] = covariance
         self._levels = np.zeros(3)
         self._unit = np.ones((3, 1))
         self._evidence = np.zeros(MEMBERS)
-        self._before = (t_s, self._motions, self._covariance)
+        self._before = t_s, self._bank.copy()
 
     def predict(self, t_s: float) -> None:
         """Carry all members to a time."""
@@ -134,12 +95,9 @@ class MotionFilter:
             return
         if self.frames == 1:
             self._widen(dt)
-        self._before = (self.t_s, self._motions, self._covariance)
-        self._motions, carried = advance(self._motions, self._craft, self._inertia, self.t_s, t_s)
-        density = np.power(STEP, self._levels + _OFFSETS).T
-        noise = Unmodelled(*(density * self._unit))
-        added = noise_over(self._motions, noise, self._craft.camera_from_orbital(t_s), dt)
-        self._covariance = carried @ self._covariance @ carried.transpose(0, 2, 1) + added
+        self._before = self.t_s, self._bank.copy()
+        densities = np.power(STEP, self._levels + _OFFSETS) * self._unit[:, 0]
+        self._bank.predict(self._craft, self._inertia, self.t_s, t_s, densities)
         self.t_s = t_s
 
     def reopen(self, pose: Pose) -> None:
@@ -167,19 +125,21 @@ class MotionFilter:
                 return
             self._levels = self._levels + worse
             self._evidence = np.zeros(MEMBERS)
-            self.t_s, self._motions, self._covariance = self._before
+            before_s, bank = self._before
+            self.t_s, self._bank = before_s, bank.copy()
             self.predict(t_s)
 
     def _widen(self, dt: float) -> None:
         """Before the second frame nothing is known of rates: their scale comes from frames and distance."""
-        reach = FIRST_SHARE * float(np.linalg.norm(self._motions.position_m[0])) / dt
-        diagonal = self._covariance[:, range(STATE), range(STATE)]
+        place, covariances = self._bank.states[0, PLACE], self._bank.covariances
+        distance = float(np.linalg.norm(place))
+        reach = FIRST_SHARE * distance / dt
+        diagonal = covariances[:, range(STATE), range(STATE)]
         diagonal[:, VELOCITY] = reach**2
         diagonal[:, RATE] = (FIRST_TURN_RAD / dt) ** 2
         diagonal[:, ACCELERATION] = (0.3 * reach / dt) ** 2
-        self._covariance[:, range(STATE), range(STATE)] = diagonal
-        pose = self._covariance[0, :6, :6]
-        sight = self._motions.position_m[0] / np.linalg.norm(self._motions.position_m[0])
+        covariances[:, range(STATE), range(STATE)] = diagonal
+        pose, sight = covariances[0, :6, :6], place / distance
         along = float(sight @ pose[:3, :3] @ sight)
         across = 0.5 * (float(np.trace(pose[:3, :3])) - along)
         turn = float(np.trace(pose[3:, 3:])) / 3.0
@@ -193,8 +153,7 @@ class MotionFilter:
     @property
     def prior(self) -> tuple[Pose, Floats]:
         """Predicted pose of the middle member and its covariance (6, 6)."""
-        motions = self._motions
-        return Pose(motions.rotation[0], motions.position_m[0]), self._covariance[0, :6, :6]
+        return self._bank.pose(0), self._bank.covariances[0, :6, :6].copy()
 
     def update(self, frame: FrameInformation) -> float:
         """Take a frame at the time of the last prediction.
@@ -202,39 +161,11 @@ class MotionFilter:
         Returns:
             Log of the likelihood that the middle member gave it, up to a constant.
         """
-        off = np.empty((MEMBERS, 6))
-        off[:, :3] = self._motions.position_m - frame.pose.position_camera_m
-        off[:, 3:] = rotation_vectors(self._motions.rotation @ frame.pose.camera_from_body.T)
-        weighed = off @ frame.information
-        slope = frame.gradient - weighed  # at each member's prediction
-        top = self._covariance[:, :6, :]
-        # gain G = P E' (1 + I E P E')^-1, so that the step is G slope
-        spread = _EYE6 + frame.information @ top[:, :, :6]
-        gain = np.linalg.solve(spread.transpose(0, 2, 1), top).transpose(0, 2, 1)
-        step = (gain @ slope[:, :, None])[:, :, 0]
-        # (1 - G I E) P (1 - G I E)' + G I G': stays positive whatever the ratio of prior and frame
-        leak = gain @ frame.information
-        keep = np.broadcast_to(_EYE, (MEMBERS, STATE, STATE)).copy()
-        keep[:, :, :6] -= leak
-        covariance = keep @ self._covariance @ keep.transpose(0, 2, 1) + leak @ gain.transpose(0, 2, 1)
-        self._covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
-        explained = (slope * step[:, :6]).sum(axis=1)
-        missed = 2.0 * (off @ frame.gradient) - (off * weighed).sum(axis=1)
-        likelihood = 0.5 * (explained + missed - np.linalg.slogdet(spread)[1] - frame.cost)
-        self._move(step)
+        likelihood = self._bank.update(frame)
         self.frames += 1
         if self.frames > 3:  # before, the wide beliefs about rates decide
             self._learn(likelihood)
         return float(likelihood[0])
-
-    def _move(self, step: Floats) -> None:
-        motions = self._motions
-        motions.position_m = motions.position_m + step[:, POSITION]
-        rotation = turns(step[:, TURN]) @ motions.rotation
-        motions.rotation = rotation @ (_EYE3_HALF - 0.5 * (rotation.transpose(0, 2, 1) @ rotation))
-        motions.velocity_m_s = motions.velocity_m_s + step[:, VELOCITY]
-        motions.rate_rad_s = motions.rate_rad_s + step[:, RATE]
-        motions.acceleration_m_s2 = motions.acceleration_m_s2 + step[:, ACCELERATION]
 
     def _learn(self, likelihood: Floats) -> None:
         self._evidence = MEMORY * self._evidence + likelihood
@@ -245,21 +176,18 @@ class MotionFilter:
         opposite = int(np.flatnonzero(np.all(np.equal(_OFFSETS, -_OFFSETS[best]), axis=1))[0])
         source = np.full(MEMBERS, best)
         source[opposite] = 0
-        motions = self._motions
-        for name in ("rotation", "position_m", "velocity_m_s", "rate_rad_s", "acceleration_m_s2"):
-            setattr(motions, name, getattr(motions, name)[source])
-        self._covariance = self._covariance[source]
+        self._bank = MotionBank(self._bank.states[source], self._bank.covariances[source])
         self._evidence = np.where(source == best, 0.0, self._evidence[0] - self._evidence[best])
 
     @property
     def estimate(self) -> MotionEstimate:
         """What the middle member believes."""
-        motions = self._motions
+        row = self._bank.states[0]
         return MotionEstimate(
-            Pose(motions.rotation[0], motions.position_m[0]),
-            motions.velocity_m_s[0],
-            motions.rate_rad_s[0],
-            self._covariance[0, :12, :12],
+            self._bank.pose(0),
+            row[SPEED].copy(),
+            row[SPIN].copy(),
+            self._bank.covariances[0, :12, :12].copy(),
         )
 
     @property
@@ -272,8 +200,8 @@ class MotionFilter:
 
     def has_finite_state(self) -> bool:
         """Whether nothing has run away."""
-        return math.isfinite(float(self._covariance.sum())) and math.isfinite(
-            float(self._motions.rotation.sum())
+        return math.isfinite(float(self._bank.covariances.sum())) and math.isfinite(
+            float(self._bank.states.sum())
         )
 
 

@@ -25,7 +25,8 @@ from groundstation.relative_navigation.matching import (
     match_labelled,
     match_near,
 )
-from groundstation.relative_navigation.motion_filter import SURPRISE, FrameInformation, MotionFilter
+from groundstation.relative_navigation.motion_bank import FrameInformation
+from groundstation.relative_navigation.motion_filter import SURPRISE, MotionFilter
 from groundstation.relative_navigation.pixel_equations import jacobian, predicted_pixels
 from groundstation.relative_navigation.pose import Pose, PoseFit
 from groundstation.relative_navigation.solvers import PoseSolver

@@ -89,6 +89,10 @@ class Scenario:
         section["timeline"] = [{"where": "remark", "at_s": 0.0, "mark": text}, *section["timeline"]]
         return replace(self, rig=varied(self.rig, {"scenario": section}))
 
+    def started_by_hand(self) -> "Scenario":
+        """The scenario whose t = 0 also waits for a person's ``start_scenario``."""
+        return replace(self, rig=varied(self.rig, {"scenario.by_hand": True}))
+
     def on_hardware(self, rig: Rig) -> "Scenario":
         """The same scenario on another rig: starts are gone to before t = 0.
 

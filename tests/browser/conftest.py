@@ -93,6 +93,20 @@ def flight(tmp_path_factory, chromium):
 
 
 @pytest.fixture
+def launch(tmp_path, chromium):
+    """Starts what prints the address of a console; ended after the test."""
+    started = []
+
+    def start(*words):
+        started.append(Served(tmp_path, *words))
+        return started[-1]
+
+    yield start
+    for run in started:
+        run.end()
+
+
+@pytest.fixture
 def opened(chromium):
     """Opens pages of a size and colour scheme; whatever the page complains of fails the test."""
     contexts, complaints = [], []

@@ -96,6 +96,37 @@ def test_a_goal_is_pointed_at_flown_ahead_and_then_sent(page, api):
     give_control(page)
 
 
+def test_a_controller_is_changed_and_what_it_cannot_fly_is_refused(page, api):
+    take_control(page)
+    card = page.get_by_role("region", name="alpha", exact=True)
+    card.get_by_text("Controller", exact=True).click()
+    card.get_by_label("alpha: controller").select_option("station")
+    card.get_by_role("button", name="Change controller").click()
+    page.wait_for_function("() => document.getElementById('notice').textContent === 'alpha flies by station'")
+    card.get_by_label("alpha: controller").select_option("follow")
+    card.get_by_label("alpha: parameters").fill('{"leader": "nobody"}')
+    card.get_by_role("button", name="Change controller").click()
+    page.wait_for_function("() => document.getElementById('notice').textContent.includes('nobody')")
+    assert api(page)["vehicles"]["alpha"]["control"]["controller"] == "station"
+    give_control(page)
+
+
+def test_the_space_bar_is_a_letter_where_one_types_and_the_stop_on_a_ticked_box(page):
+    page.evaluate("() => { window.pressed = 0; document.getElementById('notice').textContent = ''; }")
+    page.get_by_label("Note").press("Space")
+    assert page.get_by_label("Note").input_value() == " "
+    box = page.get_by_role("group", name="Layers").get_by_role("checkbox").first
+    ticked = box.is_checked()
+    page.evaluate(  # a press that is sent would end the flight of all tests
+        """() => { window.fetch = () => new Promise(() => {});
+          WebSocket.prototype.send = (text) => { window.pressed += text.includes('"stop"') ? 1 : 0; }; }"""
+    )
+    box.focus()
+    page.keyboard.press("Space")
+    page.wait_for_function("() => window.pressed === 1")
+    assert box.is_checked() == ticked
+
+
 def test_a_screen_says_within_a_second_that_what_it_shows_is_old(page, flight):
     page.wait_for_function(FRESH)
     console = flight.child("console")

@@ -9,9 +9,10 @@ import uvicorn
 
 from groundstation.bus.cdr import codec_of
 from groundstation.console.access import Access
-from groundstation.console.desk import Tokens
 from groundstation.console.feed import Feed
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import make_app
+from groundstation.console.shown_console import Console
+from groundstation.console.tokens import Tokens
 from groundstation.console.wizard_tap import HOLD_NS
 from groundstation.console.wizards import Wizards
 from groundstation.declarations.lease import Lease

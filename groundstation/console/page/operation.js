@@ -44,7 +44,7 @@ export class Operation {
     const buttons = MAIN.map(([action, label]) => el("button", {"data-action": action, title: this.rig.actions[action]?.summary, onclick: () => this.ask(name, action)}, label));
     const inputs = ["x / m", "y / m", "heading / deg"].map((label, i) => el("label", {}, label, el("input", {type: "number", step: "any", "aria-label": `${name}: goal ${label}`})));
     const goal = el("form", {class: "goal", onsubmit: (event) => { event.preventDefault(); this.planTyped(name); }}, ...inputs, el("button", {}, "Go to"));
-    const more = el("details", {}, el("summary", {}, "Controller"), this.controller(name));
+    const more = el("details", {class: "controller"}, el("summary", {}, "Controller"), this.controller(name));
     const card = el("section", {class: "vehicle", role: "region", "aria-label": name, onclick: () => this.choose(name)},
       el("header", {}, el("h2", {style: `color:${colour(index)}`}, name), el("span", {class: "small", "data-part": "age"})), words, facts);
     if (this.may) card.append(el("div", {class: "buttons"}, ...buttons), goal);
@@ -54,10 +54,29 @@ export class Operation {
   }
 
   controller(name) {
-    const about = this.rig.vehicles[name], row = this.rig.controllers[about.controller];
-    const entries = Object.entries(about.parameters).map(([key, value]) => `${key} = ${JSON.stringify(value)}`);
-    return el("div", {class: "small"}, `${about.controller}: ${row?.summary ?? ""}`, el("br"), entries.join(", ") || "parameters as its table has them",
-      el("p", {}, "Controllers are chosen in the rig or the scenario: a vehicle in flight keeps its own; a goal here interrupts its program until it is resumed."));
+    const about = this.rig.vehicles[name], rows = this.rig.controllers;
+    const named = Object.keys(rows).filter((each) => rows[each].can_be_chosen);
+    const choice = el("select", {"aria-label": `${name}: controller`}, ...named.map((each) => el("option", {value: each}, each)));
+    const summary = el("p", {class: "small"});
+    const text = el("textarea", {rows: 4, spellcheck: "false", "aria-label": `${name}: parameters`});
+    const show = () => {
+      const row = rows[choice.value], given = choice.value === about.controller ? about.parameters : {};
+      summary.textContent = `${row.summary}. Parameters: ${Object.entries(row.parameters).map(([key, {default: value}]) => value === null ? `${key} (needed)` : `${key} = ${value}`).join(", ") || "none"}`;
+      text.value = JSON.stringify(given, null, 1);
+    };
+    choice.value = named.includes(about.controller) ? about.controller : named[0];
+    choice.onchange = show;
+    show();
+    const change = el("button", {"data-action": "change_controller"}, "Change controller");
+    const form = el("form", {class: "small", onsubmit: (event) => { event.preventDefault(); this.change(name, choice.value, text.value); }}, choice, summary, text, change);
+    const rigs = el("p", {class: "small"}, `The rig has ${about.controller}. A goal interrupts a program until Resume; so does a change.`);
+    return this.may ? el("div", {}, rigs, form) : rigs;
+  }
+
+  async change(name, controller, text) {
+    let given;
+    try { given = JSON.parse(text || "{}"); } catch { this.notice(`${name}: the parameters are no JSON object`); return; }
+    if (await this.ask(name, "change_controller", {controller, parameters: JSON.stringify(given)})) this.notice(`${name} flies by ${controller}${this.rig.controllers[controller].has_program ? ": Resume begins its program" : ""}`, true);
   }
 
   choose(name) {
@@ -95,7 +114,7 @@ export class Operation {
       "air": v.valves ? v.valves.floating ? "on" : "off" : "–", "valves": v.valves ? v.valves.armed ? "armed" : "disarmed" : "–",
       "flies": control?.controller ?? "–", "limited": v.demand?.limited_by || "no",
     });
-    for (const button of own.buttons) {
+    for (const button of own.card.querySelectorAll("[data-action]")) {
       const mayAsk = FREE.has(button.dataset.action) || this.holds;
       button.disabled = !mayAsk;
     }
@@ -131,7 +150,12 @@ export class Operation {
     if (!now) return;
     const time = now.t_s === null ? "" : `, t = ${now.t_s.toFixed(1)} s`;
     const parts = [`${now.state}${time}`, now.waits_for && `waits for ${now.waits_for}`, now.reason].filter(Boolean);
-    box.replaceChildren(el("h2", {}, now.name), el("div", {class: now.state === "failed" ? "bad" : ""}, parts.join("; ")),
+    const isBegun = now.state !== "waiting", shown = `${now.name} ${parts.join()} ${JSON.stringify(limits)} ${this.holds}`;
+    if (shown === this.scenarioShown) return;   // a button that is replaced cannot be pressed
+    this.scenarioShown = shown;
+    const start = el("button", {disabled: !this.holds, title: this.holds ? "" : "Take control first", onclick: () => this.ask("", "start_scenario")}, "Start scenario");
+    const buttons = this.may && !isBegun && this.rig.starts_by_hand ? [start] : [];
+    box.replaceChildren(el("h2", {}, now.name), ...buttons, el("div", {class: now.state === "failed" ? "bad" : ""}, parts.join("; ")),
       ...(limits ?? []).map((limit) => el("div", {class: limit.held === null ? "small" : limit.held ? "good" : "bad"}, `${limit.held === null ? "open" : limit.held ? "held" : "FAILED"}: ${limit.text}`)));
   }
 

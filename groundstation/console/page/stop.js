@@ -12,12 +12,12 @@ export class Stop {
     this.button.addEventListener("pointerdown", (event) => { event.preventDefault(); this.press(); });
     this.button.addEventListener("keydown", (event) => { if (event.key === "Enter" && !event.repeat) { event.preventDefault(); this.press(); } });
     window.addEventListener("keydown", (event) => {
-      if (event.code !== "Space" || event.repeat || /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) return;
+      if (event.code !== "Space" || event.repeat || isTyping(event.target)) return;
       event.preventDefault();
       event.stopPropagation();
       this.press();
     }, true);
-    window.addEventListener("keyup", (event) => { if (event.code === "Space" && event.target.tagName === "BUTTON") event.preventDefault(); }, true);
+    window.addEventListener("keyup", (event) => { if (event.code === "Space" && !isTyping(event.target)) event.preventDefault(); }, true);
     this.button.addEventListener("click", (event) => { if (event.detail === 0 && performance.now() - this.pressed > 300) this.press(); });  // by a screen reader
     this.pressed = 0;
   }
@@ -51,4 +51,9 @@ export class Stop {
     if (outcome.accepted) this.notice(`STOP: ${modes}`, true);
     else this.notice(`STOP NOT CONFIRMED by ${(outcome.not_confirmed ?? []).join(", ") || "anybody"}: go and cut the air by hand`);
   }
+}
+
+// a space is a letter here; everywhere else, a ticked box or a list included, it is the stop
+function isTyping(target) {
+  return target.tagName === "TEXTAREA" || (target.tagName === "INPUT" && !/^(checkbox|radio|range|button)$/.test(target.type));
 }

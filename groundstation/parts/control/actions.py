@@ -20,3 +20,13 @@ GO_TO = Action(
         ),
     ),
 )
+
+CHANGE_CONTROLLER = Action(
+    "change_controller",
+    "controller",
+    "fly by another controller; it holds where it is until resume, where it has a program",
+    (
+        Argument("controller", "a row of the table of controllers", kind=str),
+        Argument("parameters", "JSON object of its parameters, as in a rig", kind=str, default="{}"),
+    ),
+)

@@ -1,8 +1,10 @@
 """Controller: vehicle state in, wrench out, at the rate of the pulse modulation."""
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller, KeepsPlaces
@@ -15,7 +17,8 @@ from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer
 from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
-from groundstation.parts.control.actions import GO_TO
+from groundstation.parts.control.actions import CHANGE_CONTROLLER, GO_TO
+from groundstation.parts.control.laws import Law, Maker
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.supervision.messages import Supervision
@@ -35,18 +38,15 @@ class ControllerNode(Node):
 
     Args:
         vehicle: Its name.
-        law: A row of the table of controllers.
-        name: Of that row.
-        holding: Flies to the goal and holds it while the law's own program is interrupted; None where the law
-            has no program and follows the goal itself.
-        waits: The program begins with the request ``resume``.
+        law: Of the rig: its neighbours' states come at their full rate.
         goal: Held from the start.
         keep_in: Goals outside are refused.
-        neighbours: Other vehicles whose states the law wants, at their full rate.
         others: All other vehicles: it is not sent to where one of them is, or is sent.
         period_s: Of the modulation.
-        obstacles: What stands on the table: goals in it are refused.
         table_map: What pulls where on the table, fed forward; None where nobody knows.
+        make: Makes the laws that it is changed to; None where it keeps its own.
+        obstacles: What stands on the table: goals in it are refused.
+        waits: The program begins with the request ``resume``.
     """
 
     inputs = (
@@ -65,27 +65,29 @@ class ControllerNode(Node):
     def __init__(
         self,
         vehicle: str,
-        law: Controller,
-        name: str,
+        law: Law,
         goal: Goal,
         keep_in: KeepIn,
-        neighbours: tuple[str, ...],
         others: tuple[str, ...],
         period_s: float,
         table_map: SlopeGrid | None = None,
-        holding: Controller | None = None,
+        make: Maker | None = None,
         *,
         obstacles: tuple[Obstacle, ...] = (),
         waits: bool = False,
     ) -> None:
         super().__init__(vehicle, round(period_s * 1e9))
-        self._program, self._holding = law, holding
-        self._law = holding if waits and holding is not None else law
-        self._name = name
+        self._chosen = law
+        self._law: Controller = law.program
+        if waits and law.holding is not None:
+            self._law = law.holding
+        self._make = make
         self._goal = goal
         self._keep_in = keep_in
-        self._followed = frozenset((vehicle, *neighbours))
+        self._at_full_rate = frozenset((vehicle, *law.neighbours))
+        self._followed = self._at_full_rate
         self._vehicles = (vehicle, *others)
+        self._led_by: dict[str, tuple[str, ...]] = {}
         self._others = Others(obstacles=obstacles)
         self._lease = LeaseCheck()
         self._states: dict[str, tuple[int, ControlState]] = {}
@@ -101,12 +103,12 @@ class ControllerNode(Node):
         if payload is VehicleState:
             return self._vehicles
         if payload is Supervision:
-            cares = isinstance(self._program, KeepsPlaces)
+            cares = isinstance(self._chosen.program, KeepsPlaces)
             return tuple(name for name in self._vehicles[1:] if cares and name in self._followed)
         return self._vehicles[1:] if payload is ControlStatus else (self.vehicle,)
 
     def takes_paced(self, payload: type[Message], source: str) -> bool:
-        return payload is VehicleState and source not in self._followed
+        return payload is VehicleState and source not in self._at_full_rate
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:
@@ -114,6 +116,7 @@ class ControllerNode(Node):
                 self._receive_state(message)
             case ControlStatus():
                 self._others.goals_table_m[message.vehicle] = message.goal_position_table_m
+                self._led_by[message.vehicle] = message.led_by
             case Supervision():
                 (self._down.add if message.mode in DOWN else self._down.discard)(message.vehicle)
             case FusionStatus():
@@ -128,8 +131,11 @@ class ControllerNode(Node):
             case Request() if message.action == GO_TO.name:
                 refusal = self._lease.objection(message, now_ns)
                 yield answer(message, now_ns, refusal or self._go_to(message))
+            case Request() if message.action == CHANGE_CONTROLLER.name:
+                refusal = self._lease.objection(message, now_ns)
+                yield answer(message, now_ns, refusal or self._change(message))
             case Request() if message.action == RESUME and not self._lease.objection(message, now_ns):
-                self._take_over(self._program)  # the supervisor answers
+                self._take_over(self._chosen.program)  # the supervisor answers
             case Lease():
                 self._lease.take(message)
 
@@ -187,8 +193,40 @@ class ControllerNode(Node):
         refusal = self._others.objection((x, y))
         if not refusal:
             self._goal = Goal((x, y), heading)
-            self._take_over(self._holding or self._program)
+            self._take_over(self._chosen.holding or self._chosen.program)
         return refusal
+
+    def _change(self, request: Request) -> str:
+        """Fly by another law from where the present one works for, or say why not."""
+        try:
+            given = CHANGE_CONTROLLER.read(request)
+            if self._make is None:
+                return "its law was given to it by a program, and stays"
+            law = self._make(str(given["controller"]), _parameters(str(given["parameters"])))
+        except ValueError as error:  # an ArgumentError is one
+            return str(error)
+        leader = self._would_follow_itself(law)
+        if leader:
+            return f"{leader} follows {self.vehicle} itself: nobody would lead"
+        self._goal = self._law.setpoint(self._goal)
+        self._chosen = law
+        self._followed = frozenset((self.vehicle, *law.neighbours))
+        self._states = {name: row for name, row in self._states.items() if name in self._followed}
+        self._take_over(law.holding or law.program)
+        return ""
+
+    def _would_follow_itself(self, law: Law) -> str:
+        """Which of the law's leaders follows this vehicle, over however many others; empty for none."""
+        for leader in law.led_by:
+            seen, waiting = set[str](), [leader]
+            while waiting:
+                name = waiting.pop()
+                if name == self.vehicle:
+                    return leader
+                if name not in seen:
+                    seen.add(name)
+                    waiting += self._led_by.get(name, ())
+        return ""
 
     def _take_over(self, law: Controller) -> None:
         if law is not self._law:
@@ -202,9 +240,26 @@ class ControllerNode(Node):
         return ControlStatus(
             now_ns,
             self.vehicle,
-            self._name,
+            self._chosen.name,
             setpoint.position_table_m,
             setpoint.heading_rad,
             distance_m,
             turn_rad,
+            self._chosen.neighbours,
+            self._chosen.led_by,
         )
+
+
+def _parameters(text: str) -> dict[str, Any]:
+    """Parameters of a controller.
+
+    Raises:
+        ValueError: They are no JSON object.
+    """
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise ValueError(f"{CHANGE_CONTROLLER.name}: the parameters are no JSON object")
+    return given

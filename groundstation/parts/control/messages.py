@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from groundstation.declarations.message import F64, PACKAGE, Float64x2, Message, Text
+from groundstation.declarations.message import F64, PACKAGE, Float64x2, Message, Text, TextSequence
 from groundstation.declarations.topic import Rank, Topic
 
 
@@ -23,7 +23,12 @@ class Wrench(Message):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlStatus(Message):
-    """The setpoint that the controller works for at present, and the distance to it."""
+    """The setpoint that the controller works for at present, and the distance to it.
+
+    Attributes:
+        neighbours: Vehicles whose states the law wants.
+        led_by: Those of them without whom it has no place of its own.
+    """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/ControlStatus"
     TOPIC: ClassVar = Topic("control_status", 5, Rank.COMMAND)
@@ -32,3 +37,5 @@ class ControlStatus(Message):
     goal_heading_rad: F64
     error_position_m: F64
     error_heading_rad: F64
+    neighbours: TextSequence
+    led_by: TextSequence

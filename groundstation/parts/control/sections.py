@@ -42,13 +42,18 @@ def control_of(rig: Rig, vehicle: str) -> tuple[ControlSection, str]:
     return rig.of_type(vehicle, ControlOfType).control, f"mock_ups.{rig.vehicles[vehicle].mock_up}.control"
 
 
-def config_of(rig: Rig, vehicle: str) -> BaseModel:
+def config_of(rig: Rig, vehicle: str, section: ControlSection | None = None) -> BaseModel:
     """The checked parameters of a vehicle's controller, with what the rig states already.
+
+    Args:
+        rig: The rig.
+        vehicle: Its name.
+        section: Another one than the rig has for it.
 
     Raises:
         pydantic.ValidationError: A parameter is unknown, missing or out of range.
     """
-    section = control_of(rig, vehicle)[0]
+    section = section or control_of(rig, vehicle)[0]
     row = controllers()[section.controller]
     fleet_m = {
         name: (keys.hold.x_m, keys.hold.y_m)

@@ -5,7 +5,7 @@ from groundstation.declarations.part import Part
 from groundstation.declarations.rig import Rig
 from groundstation.parts.scenario.conditions import Bounds
 from groundstation.parts.scenario.messages import Marker, ScenarioStatus
-from groundstation.parts.scenario.player import Player
+from groundstation.parts.scenario.player import START, Player
 from groundstation.parts.scenario.sections import ScenarioOfRig
 
 
@@ -32,5 +32,6 @@ PART = Part(
     summary="timelines: what is asked of vehicles and injected when, and when an experiment is over",
     topics=(Marker, ScenarioStatus),
     nodes=(NodeRow("player", STATION, Weight.LIGHT, Player, _player, _has_scenario, is_of_rig=True),),
+    actions=(START,),
     rig=ScenarioOfRig,
 )

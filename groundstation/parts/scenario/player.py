@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 
+from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
-from groundstation.declarations.request import Ack, Request
+from groundstation.declarations.request import Ack, Action, ArgumentError, Request, answer
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.scenario.condition_text import read_condition
@@ -20,11 +21,13 @@ STATUS_NS = 200_000_000
 PATIENCE_NS = 5_000_000_000
 """An answer that takes longer will not come."""
 RESUME = "resume"
+START = Action("start_scenario", "player", "begin the scenario that waits for it")
+BY_HAND = f"a person's {START.name}"
 STARTED_AGAIN = "the player was started again, and a timeline is not carried out twice"
 
 
 class Player(Node):
-    """Waits until all vehicles fly, then publishes what the timeline asks at its moments.
+    """Waits until all vehicles fly, or for a person; then publishes what the timeline asks at its moments.
 
     Args:
         section: The timeline.
@@ -32,9 +35,9 @@ class Player(Node):
         bounds: Of the table.
     """
 
-    inputs = (Supervision, VehicleState, ControlStatus, Ack)
+    inputs = (Supervision, VehicleState, ControlStatus, Ack, Request, Lease)
     paced = (VehicleState,)
-    outputs = (Request, Marker, ScenarioStatus)
+    outputs = (Request, Marker, ScenarioStatus, Ack)
 
     def __init__(self, section: ScenarioSection, vehicles: tuple[str, ...], bounds: Bounds) -> None:
         super().__init__("", PERIOD_NS)
@@ -45,6 +48,9 @@ class Player(Node):
         self._conditions = {
             row.where: read_condition(row.when, groups, bounds) for row in section.timeline if row.when
         }
+        self._lease = LeaseCheck()
+        self._was_ready = False
+        self._is_asked_for = not section.by_hand
         self._began_ns: int | None = None
         self._zero_ns = 0
         self._state = WAITING
@@ -57,8 +63,7 @@ class Player(Node):
         self._published: tuple[str, int] | None = None
 
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
-        del payload
-        return tuple(self._known)
+        return ("",) if payload is Request else tuple(self._known)
 
     def start(self, now_ns: int) -> Iterator[Message]:
         self._began_ns = now_ns
@@ -85,7 +90,10 @@ class Player(Node):
                 known.mode = message.mode
             case Ack() if message.author == AUTHOR:
                 self._answered(message)
-        return iter(())
+            case Lease():
+                self._lease.take(message)
+            case Request() if message.action == START.name:
+                yield answer(message, now_ns, self._start(message, now_ns))
 
     def tick(self, now_ns: int) -> Iterator[Message]:
         for known in self._known.values():
@@ -101,12 +109,29 @@ class Player(Node):
     def _begin(self, now_ns: int) -> Iterator[Message]:
         assert self._began_ns is not None
         missing = self._not_ready(now_ns)
-        if not missing:
+        if not missing and self._is_asked_for:
             self._state, self._zero_ns = RUNNING, now_ns
             for vehicle in self._section.resumed:
                 yield self._request(vehicle, RESUME, "{}", _START, now_ns)
-        elif now_ns - self._began_ns > self._section.ready_s * 1e9:
+        elif not missing:
+            self._was_ready = True
+        elif not self._was_ready and now_ns - self._began_ns > self._section.ready_s * 1e9:
             self._fail(f"ready_s: {missing} after {self._section.ready_s:g} s")
+
+    def _start(self, request: Request, now_ns: int) -> str:
+        """Take a person's start, or say why not."""
+        try:
+            START.read(request)
+        except ArgumentError as error:
+            return str(error)
+        refusal = self._lease.objection(request, now_ns)
+        if refusal:
+            return refusal
+        if self._state != WAITING or self._is_asked_for:
+            return f"the scenario is not started by hand, or has been started: it is {self._state}"
+        missing = self._not_ready(now_ns)
+        self._is_asked_for = not missing
+        return missing
 
     def _not_ready(self, now_ns: int) -> str:
         """Why t = 0 has not come."""
@@ -201,7 +226,7 @@ class Player(Node):
 
     def _waits_for(self, now_ns: int) -> str:
         if self._state == WAITING:
-            return self._not_ready(now_ns)
+            return self._not_ready(now_ns) or ("" if self._is_asked_for else BY_HAND)
         waiting = (
             row.when
             for number, row in enumerate(self._section.timeline)

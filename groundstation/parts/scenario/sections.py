@@ -46,6 +46,7 @@ class ScenarioSection(Section):
         ready_s: The vehicles fly by then, or the run has failed.
         duration_s: From t = 0.
         starters: Vehicles that t = 0 waits for.
+        by_hand: t = 0 also waits for a person's ``start_scenario``.
         settle_first: t = 0 also waits until they have settled at their starts.
         resumed: Vehicles whose controllers begin their own programs at t = 0.
         timeline: The rows.
@@ -55,6 +56,7 @@ class ScenarioSection(Section):
     ready_s: Positive
     duration_s: Positive
     starters: tuple[str, ...]
+    by_hand: bool = False
     settle_first: bool = False
     resumed: tuple[str, ...] = ()
     timeline: tuple[TimelineRow, ...] = ()

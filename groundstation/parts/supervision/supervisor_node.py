@@ -10,7 +10,7 @@ from groundstation.declarations.lease import FREE_FOR_ALL, Lease, LeaseCheck
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer, shown_name
-from groundstation.parts.control.messages import Wrench
+from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.actions import ACTIONS
@@ -46,7 +46,7 @@ class SupervisorNode(Node):
 
     inputs = (
         StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveShares, Wrench,
-        Findings, RecorderStatus, Diagnostics, OutsideControl,
+        ControlStatus, Findings, RecorderStatus, Diagnostics, OutsideControl,
     )  # fmt: skip
     paced = (VehicleState,)
     outputs = (Supervision, Faults, Ack)
@@ -130,6 +130,8 @@ class SupervisorNode(Node):
                 )
             case Wrench():
                 sightings.demand_ns = now_ns
+            case ControlStatus():  # it may be changed to another law
+                sightings.leaders = message.neighbours
             case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
                 sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns
             case ValveShares():

@@ -9,7 +9,8 @@ from oracles.hand_fed_console import HandSource
 
 from groundstation.console.access import Access
 from groundstation.console.feed import Feed
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import make_app
+from groundstation.console.shown_console import Console
 from groundstation.declarations.rig import Rig
 from groundstation.parts.table import own_tables
 from groundstation.rig.read import load_rig

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.console.access import Access, Role, new_token
-from groundstation.console.desk import Tokens
+from groundstation.console.tokens import Tokens
 
 LAN = Access("192.168.1.5", 8400, ("station.lab",), "looks", "flies", "server.pem", "server.key")
 

@@ -9,7 +9,8 @@ from fastapi.testclient import TestClient
 
 from groundstation.console.access import Access
 from groundstation.console.replay import ReplaySource
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import make_app
+from groundstation.console.shown_console import Console
 from groundstation.console.state import vehicle_state
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.errors import RecordingError

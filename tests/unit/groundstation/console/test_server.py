@@ -8,7 +8,8 @@ from fastapi.testclient import TestClient
 from oracles.hand_fed_console import HandSource, batch_of, state_of
 
 from groundstation.console.access import Access
-from groundstation.console.server import Console, make_app
+from groundstation.console.server import make_app
+from groundstation.console.shown_console import Console
 from groundstation.declarations.rig import Rig
 
 

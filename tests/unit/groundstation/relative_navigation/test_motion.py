@@ -2,14 +2,25 @@
 
 import numpy as np
 import pytest
+from oracles import motion_bank as oracle
 from oracles import relative_scenes as scenes
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from groundstation.relative_navigation.attitude_motion import Vertical, turn_on
+from groundstation.relative_navigation.attitude_motion import turn_on
 from groundstation.relative_navigation.hill import hill_constants, hill_response, hill_transition
 from groundstation.relative_navigation.hill_figure import draw_relative_orbit
-from groundstation.relative_navigation.motion import CameraCraft, Motions, advance
+from groundstation.relative_navigation.motion import CameraCraft
+from groundstation.relative_navigation.motion_bank import (
+    PLACE,
+    PULL,
+    ROTATION,
+    SPEED,
+    SPIN,
+    FrameInformation,
+    MotionBank,
+)
+from groundstation.relative_navigation.pose import Pose
 from groundstation.relative_navigation.precession import AxialInertia, precess, precession_of, rate_after
 
 RATE = 1.106819e-3  # rad/s, of the published elements of Progress
@@ -75,14 +86,18 @@ def test_gravity_turns_a_body_towards_the_vertical(rng):
 
     times = np.array([0.0, 300.0])
     rotations, rates = scenes.spin(times, start, rate, scenes.INERTIA, torque)
-    body = start.inv()
-    vertical = Vertical(body.apply([1.0, 0, 0])[None], body.apply([0, 0, 1.0])[None], RATE)
-    turned = turn_on(rate[None], scenes.INERTIA, 300.0, vertical)
-    free = turn_on(rate[None], scenes.INERTIA, 300.0)
     exact = start.inv() * rotations[-1]
-    assert (Rotation.from_matrix(turned.turns[0]).inv() * exact).magnitude() < 3e-5
-    assert turned.rates_rad_s[0] == pytest.approx(rates[-1], abs=1e-7)
-    assert (Rotation.from_matrix(free.turns[0]).inv() * exact).magnitude() > 1e-3
+    for n, is_near in ((RATE, True), (0.0, False)):  # an orbit that is not known pulls nobody
+        camera = CameraCraft(
+            n, lambda t, n=n: Rotation.from_rotvec([0, 0, n * t]).as_matrix()
+        )  # it keeps still
+        bank = MotionBank.at(1, Pose(start.as_matrix(), np.array([0.0, 0, 5.0])), np.eye(6))
+        bank.states[:, SPIN] = rate
+        bank.predict(camera, scenes.INERTIA, 0.0, 300.0, np.zeros((1, 3)))
+        turned = start.inv() * Rotation.from_matrix(bank.pose(0).camera_from_body)
+        off_rad = (turned.inv() * exact).magnitude()
+        assert off_rad < 3e-5 if is_near else off_rad > 1e-3
+        assert (bank.states[0, SPIN] == pytest.approx(rates[-1], abs=1e-7)) == is_near
 
 
 @pytest.mark.parametrize("inertia", [scenes.INERTIA, None])
@@ -92,57 +107,114 @@ def test_errors_of_a_motion_go_on_as_differences_say(rng, inertia, size):
     craft = CameraCraft(
         RATE, lambda t: Rotation.from_rotvec([0, 0, 0.01 * t]).as_matrix() @ tilt, np.array([0.1, 0.2, 0.3])
     )
-    rotation = Rotation.random(random_state=5).as_matrix()
-    base = [
-        rotation,
-        np.array([0.5, -0.2, 6.0]),
-        rng.normal(0, 0.01, 3),
-        size * rng.normal(size=3),
-        rng.normal(0, 1e-4, 3),
-    ]
+    members = some_members(rng, 1, size)
+    members.covariances[:] = 0.0
 
     def after(step):
-        motions = Motions(
-            (Rotation.from_rotvec(step[3:6]).as_matrix() @ base[0])[None],
-            (base[1] + step[:3])[None],
-            (base[2] + step[6:9])[None],
-            (base[3] + step[9:12])[None],
-            (base[4] + step[12:])[None],
-        )
-        return advance(motions, craft, inertia, 10.0, 12.0)
+        bank = members.copy()
+        (row,) = bank.states
+        row[ROTATION] = (Rotation.from_rotvec(step[3:6]).as_matrix() @ row[ROTATION].reshape(3, 3)).ravel()
+        row[PLACE] += step[:3]
+        row[SPEED] += step[6:9]
+        row[SPIN] += step[9:12]
+        row[PULL] += step[12:]
+        bank.predict(craft, inertia, 10.0, 12.0, np.zeros((1, 3)))
+        return bank.states[0]
 
-    middle, carried = after(np.zeros(15))
     found = np.empty((15, 15))
     for k in range(15):
-        ends = []
-        for sign in (1, -1):
-            step = np.zeros(15)
-            step[k] = sign * 1e-6
-            end, _ = after(step)
-            turned = Rotation.from_matrix(end.rotation[0] @ middle.rotation[0].T).as_rotvec()
-            ends.append(
-                np.r_[
-                    end.position_m[0],
-                    turned,
-                    end.velocity_m_s[0],
-                    end.rate_rad_s[0],
-                    end.acceleration_m_s2[0],
-                ]
-            )
-        found[:, k] = (ends[0] - ends[1]) / 2e-6
+        step = np.zeros(15)
+        step[k] = 1e-6
+        plus, minus = after(step), after(-step)
+        turned = Rotation.from_matrix(plus[ROTATION].reshape(3, 3) @ minus[ROTATION].reshape(3, 3).T)
+        found[:, k] = (
+            np.r_[
+                plus[PLACE] - minus[PLACE],
+                turned.as_rotvec(),
+                plus[SPEED] - minus[SPEED],
+                plus[SPIN] - minus[SPIN],
+                plus[PULL] - minus[PULL],
+            ]
+            / 2e-6
+        )
     # the torque's change with the attitude is left out: 3 n^2 over the span
-    assert carried[0] == pytest.approx(found, abs=0.003 if size > 0.1 else 2e-4)
+    for k in range(15):
+        members.covariances[:] = 0.0
+        members.covariances[0, k, k] = 1.0
+        bank = members.copy()
+        bank.predict(craft, inertia, 10.0, 12.0, np.zeros((1, 3)))
+        expected = np.outer(found[:, k], found[:, k])
+        assert bank.covariances[0] == pytest.approx(expected, abs=0.01 if size > 0.1 else 1e-3)
+
+
+def some_members(rng, count, size=0.4):
+    """Members that differ in everything."""
+    bank = MotionBank.at(count, Pose(np.eye(3), np.array([0.5, -0.2, 6.0])), np.eye(6))
+    for row, covariance in zip(bank.states, bank.covariances, strict=True):
+        row[ROTATION] = Rotation.random(random_state=rng.integers(1000)).as_matrix().ravel()
+        row[PLACE] += rng.normal(0, 0.1, 3)
+        row[SPEED], row[PULL] = rng.normal(0, 0.01, 3), rng.normal(0, 1e-4, 3)
+        row[SPIN] = size * rng.normal(size=3)
+        root = rng.normal(0, 0.1, (15, 15))
+        covariance[:] = root @ root.T
+    return bank
+
+
+def as_motions(bank):
+    """The same for the NumPy twin."""
+    rows = bank.states
+    return oracle.Motions(
+        rows[:, ROTATION].reshape(-1, 3, 3), rows[:, PLACE], rows[:, SPEED], rows[:, SPIN], rows[:, PULL]
+    )
+
+
+def is_the_same(bank, motions, covariances):
+    found = as_motions(bank)
+    for name in ("rotation", "position_m", "velocity_m_s", "rate_rad_s", "acceleration_m_s2"):
+        assert getattr(found, name) == pytest.approx(getattr(motions, name), rel=1e-9, abs=1e-11), name
+    assert bank.covariances == pytest.approx(covariances, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("inertia", [scenes.INERTIA, None])
+@pytest.mark.parametrize("orbital_rate", [0.0, RATE])
+@pytest.mark.parametrize("span_s", [0.033, 3.0])
+def test_the_core_carries_members_as_numpy_does(rng, inertia, orbital_rate, span_s):
+    craft = CameraCraft(
+        orbital_rate,
+        lambda t: Rotation.from_rotvec([0.02 * t, 0.1, 0]).as_matrix(),
+        np.array([0.1, 0.2, 0.3]),
+    )
+    bank = some_members(rng, 7)
+    densities = np.exp(rng.normal(0, 1, (7, 3)))
+    motions, carried = oracle.advance(as_motions(bank.copy()), craft, inertia, 5.0, 5.0 + span_s)
+    noise = oracle.noise_over(
+        motions, oracle.Unmodelled(*densities.T), craft.camera_from_orbital(5.0 + span_s), span_s
+    )
+    expected = carried @ bank.covariances @ carried.transpose(0, 2, 1) + noise
+    bank.predict(craft, inertia, 5.0, 5.0 + span_s, densities)
+    is_the_same(bank, motions, expected)
+
+
+def test_the_core_takes_a_frame_as_numpy_does(rng):
+    bank = some_members(rng, 7)
+    rows = rng.normal(0, 5, (12, 6))
+    for row in bank.states:
+        row[ROTATION] = (
+            Rotation.from_rotvec(rng.normal(0, 0.1, 3)).as_matrix() @ bank.states[0, ROTATION].reshape(3, 3)
+        ).ravel()
+    frame = FrameInformation(bank.pose(0), rows.T @ rows, rows.T @ rng.normal(0, 1, 12), 11.0)
+    motions, covariances, likelihood = oracle.update(as_motions(bank.copy()), bank.covariances.copy(), frame)
+    assert bank.update(frame) == pytest.approx(likelihood, rel=1e-9)
+    is_the_same(bank, motions, covariances)
 
 
 def test_a_camera_on_a_turning_craft_sees_what_flies_straight_turn(rng):
     """Against a simulation in inertial space: nobody turns but the camera's craft."""
     craft = CameraCraft(RATE, lambda _t: np.eye(3))
-    motions = Motions(
-        np.eye(3)[None], np.array([[0.0, 0, 5.0]]), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))
-    )
-    after, _ = advance(motions, craft, None, 0.0, 100.0)
+    bank = MotionBank.at(1, Pose(np.eye(3), np.array([0.0, 0, 5.0])), np.eye(6))
+    bank.predict(craft, None, 0.0, 100.0, np.zeros((1, 3)))
     expected = Rotation.from_rotvec([0, 0, -RATE * 100.0])  # the orbital frame turns on by +n about z
-    assert after.rotation[0] == pytest.approx(expected.as_matrix(), abs=1e-12)
+    assert bank.pose(0).camera_from_body == pytest.approx(expected.as_matrix(), abs=1e-12)
 
 
 def test_the_precession_of_the_published_stage():

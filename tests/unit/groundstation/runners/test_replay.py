@@ -54,7 +54,7 @@ class Adder(Node):
         yield Wrench(message.stamp_ns, self.vehicle, self.sum, -0.0, float("nan"), 0.0, 0.0, self.sum / 7)
 
     def tick(self, now_ns):
-        yield ControlStatus(now_ns, self.vehicle, "adder", (self.sum, 0.0), 0.0, float("inf"), 0.0)
+        yield ControlStatus(now_ns, self.vehicle, "adder", (self.sum, 0.0), 0.0, float("inf"), 0.0, (), ())
 
     def stop(self, now_ns):
         yield Diagnostics(now_ns, "", "adder", 0, "stopping", (), ())

@@ -18,7 +18,7 @@ PAYLOADS = installed_tables().payloads
 
 
 def status(heading_rad=0.0, error_m=0.0, position=(0.0, 0.0)):
-    return ControlStatus(5, "alpha", "station", position, heading_rad, error_m, 0.0)
+    return ControlStatus(5, "alpha", "station", position, heading_rad, error_m, 0.0, (), ())
 
 
 def compare(then, now, **allowed):
@@ -49,7 +49,7 @@ def test_infinity_is_close_to_itself():
 
 
 def test_texts_and_integers_have_no_tolerance():
-    then, now = status(), ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0)
+    then, now = status(), ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0, (), ())
     found = compare(then, now)[1]
     assert (found.field, found.recorded, found.replayed) == ("controller", "'station'", "'brake'")
     assert "sequence 3" in str(found)
@@ -111,8 +111,11 @@ def test_a_unit_forgives_numbers_and_nothing_else():
 
     assert replayed(status(error_m=0.09)) == (False, None)
     assert replayed(status(error_m=0.11))[1].apart == pytest.approx(0.11)
-    assert replayed(ControlStatus(6, "alpha", "station", (0.0, 0.0), 0.0, 0.0, 0.0))[1].field == "stamp_ns"
-    assert replayed(ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0))[1].apart is None
+    assert (
+        replayed(ControlStatus(6, "alpha", "station", (0.0, 0.0), 0.0, 0.0, 0.0, (), ()))[1].field
+        == "stamp_ns"
+    )
+    assert replayed(ControlStatus(5, "alpha", "brake", (0.0, 0.0), 0.0, 0.0, 0.0, (), ()))[1].apart is None
 
 
 def test_a_difference_is_told_with_its_size():

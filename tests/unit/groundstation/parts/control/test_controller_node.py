@@ -2,20 +2,26 @@
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
 from groundstation.control.keep_in import rectangle
 from groundstation.control.state import BodyWrench, Goal
+from groundstation.declarations.lease import Lease
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.controller_node import ControllerNode
+from groundstation.parts.control.laws import Law
 from groundstation.parts.control.messages import ControlStatus, Wrench
+from groundstation.parts.control.part import controller_node
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
+from groundstation.rig.read import load_rig
 
 MS = 1_000_000
+RIGS = Path(__file__).parents[5] / "examples" / "rigs"
 
 
-class Law:
+class NotingLaw:
     """Notes which neighbours it is given."""
 
     def __init__(self):
@@ -40,19 +46,34 @@ def state(vehicle, x_m, y_m, status="flying", stamp_ns=0):
 
 
 def status(vehicle, x_m, y_m):
-    return ControlStatus(0, vehicle, "station", (x_m, y_m), 0.0, 0.0, 0.0)
+    return ControlStatus(0, vehicle, "station", (x_m, y_m), 0.0, 0.0, 0.0, (), ())
 
 
 @pytest.fixture
 def law():
-    return Law()
+    return NotingLaw()
+
+
+def change(node, controller, **parameters):
+    given = {"controller": controller, "parameters": json.dumps(parameters)}
+    (ack,) = node.receive(Request(0, "alpha", 1, "anna", "change_controller", json.dumps(given)), 5)
+    assert isinstance(ack, Ack)
+    assert ack.accepted == (not ack.reason)
+    return ack.reason
+
+
+@pytest.fixture
+def flown():
+    """The controller of a mock-up of a rig."""
+    return controller_node(load_rig(RIGS / "two_mock_ups_drawn.toml"), "alpha")
 
 
 @pytest.fixture
 def node(law):
     keep_in = rectangle((4.0, 3.0), margin_m=0.2)
     goal = Goal((0.0, 0.0), 0.0)
-    return ControllerNode("alpha", law, "station", goal, keep_in, ("beta",), ("beta", "gamma"), 0.05)
+    of_rig = Law("station", law, neighbours=("beta",))
+    return ControllerNode("alpha", of_rig, goal, keep_in, ("beta", "gamma"), 0.05)
 
 
 def send(node, x_m, y_m):
@@ -115,3 +136,85 @@ def test_what_lies_outside_the_table_is_refused_first(node):
     take(node, state("gamma", 1.7, 0.0))
     assert "outside the part of the table" in send(node, 1.9, 0.0)
     assert math.isclose(node.tick_period_ns, 50 * MS)
+
+
+def published(node):
+    """The newest status that it publishes within half a second of a state."""
+    now_ns = 1000 * MS
+    take(node, state("alpha", 0.1, 0.2, stamp_ns=now_ns))
+    found = [made for _ in range(3) for made in _ticked(node, now_ns) if isinstance(made, ControlStatus)]
+    return found[-1]
+
+
+def _ticked(node, now_ns):
+    take(node, state("alpha", 0.1, 0.2, stamp_ns=now_ns))
+    return list(node.tick(now_ns))
+
+
+def test_it_is_changed_to_another_controller_and_holds_where_it_worked_for(flown):
+    before = published(flown)
+    assert change(flown, "station") == ""
+    after = published(flown)
+    assert (before.controller, after.controller) == ("go_to", "station")
+    assert after.goal_position_table_m == before.goal_position_table_m
+    assert after.goal_heading_rad == before.goal_heading_rad
+
+
+def test_a_program_that_it_is_changed_to_waits_for_resume(flown):
+    goal = published(flown).goal_position_table_m
+    assert change(flown, "path", waypoints_m=[[1.0, 0.0], [1.0, 0.5]], speed_m_s=0.05) == ""
+    held = published(flown)
+    assert (held.controller, held.goal_position_table_m) == ("path", goal)
+    take(flown, Request(0, "alpha", 2, "anna", "resume", "{}"))
+    assert published(flown).goal_position_table_m != goal
+
+
+def test_a_new_leader_is_reported_and_its_state_reaches_the_law(flown):
+    assert change(flown, "follow", leader="beta", distance_m=0.8) == ""
+    status = published(flown)
+    assert (status.neighbours, status.led_by) == (("beta",), ("beta",))
+
+
+def test_nobody_follows_who_follows_it_over_however_many(flown):
+    gamma = ControlStatus(0, "gamma", "follow", (0.0, 0.0), 0.0, 0.0, 0.0, ("alpha",), ("alpha",))
+    beta = ControlStatus(0, "beta", "follow", (0.0, 0.0), 0.0, 0.0, 0.0, ("gamma",), ("gamma",))
+    take(flown, gamma, beta)
+    reason = change(flown, "follow", leader="beta", distance_m=0.8)
+    assert reason == "beta follows alpha itself: nobody would lead"
+    assert published(flown).controller == "go_to"
+
+
+@pytest.mark.parametrize(
+    ("controller", "parameters", "words"),
+    [
+        ("warp", {}, "controller 'warp' is none of"),
+        ("path", {"waypoints_m": [[0.0, 0.0]], "sped_m_s": 1.0}, "sped_m_s: is no parameter"),
+        ("follow", {"leader": "nobody", "distance_m": 0.8}, "'nobody' is no other vehicle"),
+        ("follow", {"leader": "alpha", "distance_m": 0.8}, "'alpha' is no other vehicle"),
+        ("go_to", {"speed_m_s": math.inf}, "speed_m_s"),
+        ("dock", {"target": "beta"}, "name the docking in the rig"),
+        ("trajectory", {"places_m": [[0.0, 0.0], [1.0, 0.0]]}, "plans for all ships"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_in_a_sentence_and_changes_nothing(
+    flown, controller, parameters, words
+):
+    assert words in change(flown, controller, **parameters)
+    assert published(flown).controller == "go_to"
+
+
+@pytest.mark.parametrize("text", ["[]", "5", "{", "[" * 400])
+def test_parameters_are_a_json_object(flown, text):
+    given = json.dumps({"controller": "station", "parameters": text})
+    (ack,) = flown.receive(Request(0, "alpha", 1, "anna", "change_controller", given), 5)
+    assert ack.reason == "change_controller: the parameters are no JSON object"
+
+
+def test_who_does_not_hold_control_changes_nothing(flown):
+    take(flown, Lease(0, "", "bert", 10**12, ""))
+    assert "bert" in change(flown, "station")
+    assert published(flown).controller == "go_to"
+
+
+def test_a_law_of_a_program_stays(node):
+    assert "stays" in change(node, "go_to")

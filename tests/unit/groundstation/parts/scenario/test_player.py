@@ -2,6 +2,7 @@
 
 import pytest
 
+from groundstation.declarations.lease import Lease
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import ControlStatus
 from groundstation.parts.fusion.messages import VehicleState
@@ -42,7 +43,7 @@ class Run:
                 self._take(self.player.receive(_ruling(now_ns, name, mode), now_ns))
                 state = VehicleState(now_ns, name, place, 0.0, (0.0, 0.0), 0.0, sigma, "flying", 1)
                 self._take(self.player.receive(state, now_ns))
-                status = ControlStatus(now_ns, name, "go_to", goal, 0.0, self.off_m[name], 0.0)
+                status = ControlStatus(now_ns, name, "go_to", goal, 0.0, self.off_m[name], 0.0, (), ())
                 self._take(self.player.receive(status, now_ns))
             self._take(self.player.tick(now_ns))
 
@@ -211,3 +212,37 @@ def test_who_is_started_again_while_they_fly_carries_nothing_out_twice():
     assert run.status.state == "failed"
     assert "alpha flew already" in run.status.reason
     assert run.of(Request) == []
+
+
+def _start(run, author="anna"):
+    request = Request(0, "", 7, author, "start_scenario", "{}")
+    (ack,) = run.player.receive(request, run.now_ms * MS)
+    return ack.reason
+
+
+def test_started_by_hand_it_waits_for_a_person_however_long():
+    run = Run(row(at_s=1.0, mark="one"), by_hand=True, ready_s=2.0)
+    assert _start(run) == "alpha does not fly"
+    run.fly()
+    run.until(9000)
+    assert (run.status.state, run.status.waits_for) == ("waiting", "a person's start_scenario")
+    assert _start(run) == ""
+    run.until(10_100)
+    assert (run.status.state, run.status.zero_ns) == ("running", 9020 * MS)
+    assert [at_ms for at_ms, _ in run.of(Marker)] == [10_020]
+    assert "running" in _start(run)
+
+
+def test_one_that_starts_by_itself_is_started_by_nobody():
+    run = Run()
+    assert "not started by hand" in _start(run)
+
+
+def test_who_does_not_hold_control_starts_nothing():
+    run = Run(by_hand=True)
+    run.fly()
+    run.until(100)
+    run._take(run.player.receive(Lease(0, "", "bert", 10**12, ""), 1))
+    assert "bert" in _start(run)
+    assert run.status.state == "waiting"
+    assert _start(run, "bert") == ""
