@@ -69,8 +69,6 @@ def run_scenario(scenario: Scenario, asked: Asked) -> int:
     else:
         check_failures(scenario)
         check_dispersions(scenario)
-    if asked.by_hand:
-        scenario = scenario.started_by_hand()
     try:
         judged = _flown(scenario, asked, seed)
     except UsageError:
@@ -108,6 +106,8 @@ def _flown(scenario: Scenario, asked: Asked, seed: int) -> Judged:
     trouble = ""
     if not asked.lockstep and scenario.rig.laboratory is not None:
         scenario = scenario.vary({"laboratory.seed": seed})
+    if asked.by_hand:
+        scenario = scenario.started_by_hand()
     kept = kept_in(asked.record, scenario.rig, rig_text(scenario.rig), scenario.name, asked.text)
     with kept as (recording, folder):
         try:

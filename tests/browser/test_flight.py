@@ -103,6 +103,10 @@ def test_a_controller_is_changed_and_what_it_cannot_fly_is_refused(page, api):
     card.get_by_label("alpha: controller").select_option("station")
     card.get_by_role("button", name="Change controller").click()
     page.wait_for_function("() => document.getElementById('notice').textContent === 'alpha flies by station'")
+    page.wait_for_function(  # its status comes five times a second
+        "() => [...document.querySelectorAll('[aria-label=alpha] dd')]"
+        ".some((each) => each.innerText === 'station')"
+    )
     card.get_by_label("alpha: controller").select_option("follow")
     card.get_by_label("alpha: parameters").fill('{"leader": "nobody"}')
     card.get_by_role("button", name="Change controller").click()
@@ -161,11 +165,15 @@ def test_strips_show_any_field_and_are_saved(page):
         "() => [...document.querySelectorAll('.strip')].at(-1).querySelector('.small')"
         ".textContent.match(/\\d/)"
     )
-    with page.expect_download() as waiting:
-        page.get_by_role("button", name="Save CSV").click()
-    text = waiting.value.path().read_text()
-    assert text.startswith("t_s,field,value,note\n")
-    assert text.count('"alpha/imu.rate_body_rad_s"') > 20
+    for _ in range(100):  # until samples of a fifth of a second have come
+        with page.expect_download() as waiting:
+            page.get_by_role("button", name="Save CSV").click()
+        text = waiting.value.path().read_text()
+        assert text.startswith("t_s,field,value,note\n")
+        if text.count('"alpha/imu.rate_body_rad_s"') > 20:
+            break
+    else:
+        pytest.fail("samples do not gather")
     with page.expect_download() as waiting:
         page.get_by_role("button", name="Save PNG").click()
     assert waiting.value.path().read_bytes().startswith(b"\x89PNG")
