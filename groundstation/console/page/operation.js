@@ -61,7 +61,7 @@ export class Operation {
     const text = el("textarea", {rows: 4, spellcheck: "false", "aria-label": `${name}: parameters`});
     const show = () => {
       const row = rows[choice.value], given = choice.value === about.controller ? about.parameters : {};
-      summary.textContent = `${row.summary}. Parameters: ${Object.entries(row.parameters).map(([key, {default: value}]) => value === null ? `${key} (needed)` : `${key} = ${value}`).join(", ") || "none"}`;
+      summary.textContent = `${row.summary}. Parameters: ${Object.entries(row.parameters).map(([key, {default: value}]) => value === null ? `${key} (needed)` : `${key} = ${value.length > 40 ? "…" : value}`).join(", ") || "none"}`;
       text.value = JSON.stringify(given, null, 1);
     };
     choice.value = named.includes(about.controller) ? about.controller : named[0];
