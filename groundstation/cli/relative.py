@@ -5,6 +5,7 @@ import typer
 from groundstation.cli.relative_centroids import centroids
 from groundstation.cli.relative_spin import spin
 from groundstation.cli.relative_target import target
+from groundstation.cli.relative_tle import tle
 from groundstation.cli.relative_track import track
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
@@ -22,3 +23,4 @@ app.command()(track)
 app.command()(centroids)
 app.command()(spin)
 app.command()(target)
+app.command()(tle)

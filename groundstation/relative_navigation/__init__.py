@@ -25,6 +25,7 @@ Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O,
 ``tracker``            frames -> ``Track``, one answer per frame
 ``stage_spin``         rates of a stage in regular precession from a few frames
 ``error_table``        the published table's statistics beside honest ones
+``two_line_elements``  relative motion from the NORAD catalogue by SGP4
 =====================  ==================================================================================
 
 Frames: ``camera`` (x right, y down, z forward, origin in the optical centre), ``body`` (of the target),
