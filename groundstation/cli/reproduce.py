@@ -21,13 +21,15 @@ app = typer.Typer(rich_markup_mode=None)
 def reproduce(
     study: Annotated[str | None, typer.Argument(help="Name of a study; without one they are listed.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for report.html, results.json and the flights' recordings.")
+        Path | None, typer.Option(help="Folder for report.html, results.json and recordings of flights.")
     ] = None,
-    figure: Annotated[int | None, typer.Option(help="Only the published figure of this number.")] = None,
+    figure: Annotated[
+        str | None, typer.Option(help="Only the published figure or table of this number, such as 8 or 2.12.")
+    ] = None,
 ) -> None:
     """Run a published experiment again: each figure beside the published number, and with our defaults.
 
-    Flights are flown in the emulator under the published condition, as far as it is stated; what had to be
+    Data are made by the emulator under the published condition, as far as it is stated; what had to be
     assumed stands beside each figure, and a number that does not come out is shown as such.
 
     Example: groundstation reproduce
@@ -35,6 +37,8 @@ def reproduce(
     Example: groundstation reproduce air-table --out try/air_table
 
     Example: groundstation reproduce air-table --out try/air_table --figure 16
+
+    Example: groundstation reproduce chibis --out try/chibis --figure 2.12
     """
     known = studies()
     if study is None:
@@ -68,10 +72,10 @@ def _print_study(study: Study) -> None:
         print(f"  {row.label}: {row.title}")
 
 
-def _rows(study: Study, figure: int | None) -> list[FigureRow]:
+def _rows(study: Study, figure: str | None) -> list[FigureRow]:
     if figure is None:
         return list(study.figures)
-    rows = [row for row in study.figures if figure in row.numbers]
+    rows = [row for row in study.figures if figure in map(str, row.numbers)]
     if not rows:
         known = ", ".join(str(number) for row in study.figures for number in row.numbers)
         raise UsageError(f"{study.name} has no figure {figure} to draw: it draws {known}.")

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from groundstation.relative_navigation.answers import Track
+from groundstation.relative_navigation.published_frames import PublishedFrames
 from groundstation.relative_navigation.single_frames import SingleFrames
 from groundstation.relative_navigation.solvers import PoseSolver
 from groundstation.relative_navigation.tracker import MotionTracker
@@ -23,6 +24,6 @@ class Tracker(Protocol):
 
 DEFAULT = "hill-euler"
 MOTION_MODELS: Mapping[str, Callable[[TrackerSettings, PoseSolver], Tracker]] = MappingProxyType(
-    {DEFAULT: MotionTracker, "none": SingleFrames}
+    {DEFAULT: MotionTracker, "none": SingleFrames, "published": PublishedFrames}
 )
 """Name to what follows a target."""

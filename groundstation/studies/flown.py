@@ -1,8 +1,8 @@
-"""A flight of a study: flown in lockstep into a recording, and read back as arrays."""
+"""Flights as a source of a study: flown in lockstep into recordings, and read back as arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +20,12 @@ from groundstation.rig.read import load_rig, read_text
 from groundstation.scenario.loading import made
 from groundstation.scenario.running import fly_recorded, seed_for
 from groundstation.scenario.scenario_file import WHAT, content_of
+from groundstation.studies.study import Progress
 from groundstation.watch.recorded_flight import opened, recorded_flight
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+FLIGHTS = "flights"
+"""Folder of the recordings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +49,47 @@ class Flown:
         reference = self.data.reference.copy()
         reference[:, 3] = np.unwrap(reference[:, 3])
         return np.array([np.interp(t_s, reference[:, 0], row) for row in reference[:, 1:].T])
+
+
+Sides = Mapping[str, Flown]
+"""A flight of each side."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightRow:
+    """A flight of a study, flown once for each side; a `Source`.
+
+    Attributes:
+        scenario: Its scenario file.
+        rigs: The rig of each side.
+    """
+
+    scenario: Path
+    rigs: Mapping[str, Path]
+
+    @property
+    def size(self) -> float:
+        """How often it is flown."""
+        return float(len(self.rigs))
+
+    def make(self, name: str, folder: Path, progress: Progress) -> Sides:
+        """Fly it; the recordings stay in the folder ``flights``.
+
+        Raises:
+            UsageError: A file is wrong, or a recording cannot be written.
+            GroundStationError: A recording cannot be written any further.
+        """
+        recordings = folder / FLIGHTS
+        recordings.mkdir(parents=True, exist_ok=True)
+        flown: dict[str, Flown] = {}
+        for side, rig in self.rigs.items():
+            what, begun = f"flying {name}, {side} methods", len(flown) / len(self.rigs)
+
+            def report(text: str, _: float, what: str = what, begun: float = begun) -> None:
+                progress(f"{what}: {text}", begun)
+
+            flown[side] = fly_flight(self.scenario, rig, recordings / f"{name}_{side}.mcap", report)
+        return flown
 
 
 def fly_flight(scenario_file: Path, rig_file: Path, recording: Path, progress: Progress) -> Flown:

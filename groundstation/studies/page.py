@@ -22,10 +22,9 @@ ul { margin: .3rem 0; padding-left: 1.2rem; } .toc { columns: 2; font-size: .9re
 """
 ABOUT = (
     "Redrawn from data of the emulator, not from hardware. Published methods are those of the publication "
-    "to the letter, our defaults ours under the same condition; both were flown in a closed loop, so "
-    "their ways differ a little. A number comes out where it is the published one within the factor that "
-    "its row allows; one that the condition was chosen to have is called put in, for it proves nothing. t "
-    "= 0 is when the flight begins."
+    "to the letter, our defaults ours under the same condition. A number comes out where it is the "
+    "published one within the factor that its row allows; one that the condition was chosen to have is "
+    "called put in, for it proves nothing."
 )
 
 
@@ -56,7 +55,7 @@ def _head(study: Study, drawn: Sequence[tuple[FigureRow, Drawn]]) -> str:
         f"<header>\n<h1>{escape(study.title)}, run again</h1>\n<p>{escape(study.source)}</p>\n"
         f'<p><span class="comes">{good} published numbers come out</span>'
         f"{_does_not(bad)}; the others are not stated, or not compared.</p>\n"
-        f'<p class="faint">{escape(ABOUT)} Made with {escape(software())}.</p>\n'
+        f'<p class="faint">{escape(ABOUT)} {escape(study.about)} Made with {escape(software())}.</p>\n'
         f'<ul class="toc">{entries}</ul>\n</header>\n'
     )
 

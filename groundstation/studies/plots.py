@@ -65,7 +65,12 @@ class Axes:
 
 
 def over_time(
-    panels: Sequence[Axes], start_s: float, stop_s: float, label: str, marks_s: Sequence[float] = ()
+    panels: Sequence[Axes],
+    start_s: float,
+    stop_s: float,
+    label: str,
+    marks_s: Sequence[float] = (),
+    along: str = "t, s",
 ) -> str:
     """Draw panels on one time axis; their lines share one legend.
 
@@ -75,12 +80,13 @@ def over_time(
         stop_s: Right edge.
         label: What the picture shows, for those who cannot see it.
         marks_s: Moments that are marked by thin dashed lines.
+        along: Name and unit of what lies along the axis, if it is not time.
     """
     drawn: list[Panel] = []
     top = TOP
     for axes in panels:
         span = axes.span or _span(axes.lines, start_s, stop_s)
-        panel = Panel(top, PANEL_HEIGHT, start_s, stop_s, Scale(*span), axes.label)
+        panel = Panel(top, PANEL_HEIGHT, start_s, stop_s, Scale(*span), axes.label, along=along)
         for moment in marks_s:
             if start_s <= moment <= stop_s:
                 x = float(panel.x(moment))

@@ -1,29 +1,25 @@
-"""A study run: its flights flown once for each side, its figures drawn, the page and the numbers written."""
+"""A study run: its data made, its figures drawn, the page and the numbers written."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from groundstation.files.writing import check_folder, write_files
-from groundstation.studies.flown import Flown, fly_flight
 from groundstation.studies.page import render_page
-from groundstation.studies.study import Drawn, FigureRow, Study
-
-Progress = Callable[[str, float], None]
-FLIGHTS = "flights"
+from groundstation.studies.study import Drawn, FigureRow, Progress, Study
 
 
 def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress: Progress) -> list[Path]:
-    """Fly what the figures need, draw them, write ``report.html`` and ``results.json``.
+    """Make what the figures need, draw them, write ``report.html`` and ``results.json``.
 
     Args:
         study: To be run again.
         figures: Of it, all or some.
-        folder: Where to write; recordings of the flights go to its folder ``flights``.
+        folder: Where to write; sources may leave there what they made, flights their recordings.
         progress: Takes what is going on and the share that is done.
 
     Returns:
@@ -34,28 +30,23 @@ def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress
         GroundStationError: A recording cannot be written any further.
     """
     check_folder(folder)
-    recordings = folder / FLIGHTS
-    names = [name for name in study.flights if any(name in row.flights for row in figures)]
-    if names:
-        recordings.mkdir(parents=True, exist_ok=True)
-    count = sum(len(study.flights[name].rigs) for name in names)
-    flown: dict[str, dict[str, Flown]] = {}
-    done = 0
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [name for name in study.sources if any(name in row.needs for row in figures)]
+    whole = 1.0 + sum(study.sources[name].size for name in names)
+    made: dict[str, Any] = {}
+    done = 0.0
     for name in names:
-        row = study.flights[name]
-        flown[name] = {}
-        for side, rig in row.rigs.items():
-            what, begun = f"flying {name}, {side} methods", done / (count + 1)
+        size = study.sources[name].size
 
-            def report(text: str, _: float, what: str = what, begun: float = begun) -> None:
-                progress(f"{what}: {text}", begun)
+        def report(text: str, share: float, begun: float = done, size: float = size) -> None:
+            progress(text, (begun + share * size) / whole)
 
-            flown[name][side] = fly_flight(row.scenario, rig, recordings / f"{name}_{side}.mcap", report)
-            done += 1
+        made[name] = study.sources[name].make(name, folder, report)
+        done += size
     drawn: list[tuple[FigureRow, Drawn]] = []
     for figure in figures:
-        progress(f"drawing {figure.label.lower()}", (count + len(drawn) / len(figures)) / (count + 1))
-        drawn.append((figure, figure.draw({name: flown[name] for name in figure.flights})))
+        progress(f"drawing {figure.label.lower()}", (done + len(drawn) / len(figures)) / whole)
+        drawn.append((figure, figure.draw({name: made[name] for name in figure.needs})))
     page, results = folder / "report.html", folder / "results.json"
     write_files(
         {

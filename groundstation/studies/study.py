@@ -1,4 +1,4 @@
-"""What a published study is: flights, figures drawn from them, and numbers beside the published ones.
+"""What a published study is: where its data come from, figures drawn from them, numbers beside published ones.
 
 A package adds a study by an entry point of the group ``groundstation.studies`` that names a `Study`.
 """
@@ -9,24 +9,49 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Protocol
 
-from groundstation.studies.flown import Flown
-
+Progress = Callable[[str, float], None]
+"""Takes what is going on and the share that is done."""
 PUBLISHED, DEFAULT = "published", "default"
 """The two sides of every figure: the published methods, and ours, under the same condition."""
 
 
+class Source(Protocol):
+    """Where data of a study come from: flights in a closed loop, or whatever a function makes."""
+
+    @property
+    def size(self) -> float:
+        """How much work it is beside the others, for the progress that is shown."""
+        ...
+
+    def make(self, name: str, folder: Path, progress: Progress, /) -> Any:  # noqa: ANN401 - figures know what
+        """Make the data.
+
+        Args:
+            name: Of the source in its study.
+            folder: Of the study's report; what is worth keeping is left there.
+            progress: Takes what is going on and the share of this source that is done.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True)
-class FlightRow:
-    """A flight of a study.
+class Generated:
+    """Data that a function makes, all sides at once.
 
     Attributes:
-        scenario: Its scenario file.
-        rigs: The rig of each side.
+        function: Takes the progress.
+        size: Beside other sources.
     """
 
-    scenario: Path
-    rigs: Mapping[str, Path]
+    function: Callable[[Progress], Any]
+    size: float = 1.0
+
+    def make(self, name: str, folder: Path, progress: Progress) -> Any:  # noqa: ANN401 - figures know what
+        """Call the function."""
+        del name, folder
+        return self.function(progress)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +116,8 @@ class Drawn:
     words: str
 
 
-Sides = Mapping[str, Flown]
-"""A flight of each side."""
-Draw = Callable[[Mapping[str, Sides]], Drawn]
-"""Draws a figure from the flights that it needs, by name."""
+Draw = Callable[[Mapping[str, Any]], Drawn]
+"""Draws a figure from what the sources that it needs have made, by name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,19 +125,19 @@ class FigureRow:
     """A figure or table of a study.
 
     Attributes:
-        numbers: Of the published figures that it redraws.
+        numbers: Of the published figures that it redraws: 8, or as text where they are ``2.12``.
         title: What they show.
         published: What the publication shows and states there.
-        flights: Names of the flights that it needs.
+        needs: Names of the sources that it needs.
         draw: Draws it.
         assumed: What is not published and had to be assumed, in sentences.
         kind: ``figure`` or ``table``.
     """
 
-    numbers: tuple[int, ...]
+    numbers: tuple[int | str, ...]
     title: str
     published: str
-    flights: tuple[str, ...]
+    needs: tuple[str, ...]
     draw: Draw
     assumed: tuple[str, ...] = ()
     kind: str = "figure"
@@ -134,14 +157,16 @@ class Study:
         name: On the command line.
         title: Of the publication, in English.
         source: Who and where.
-        flights: By name.
+        sources: Of its data, by name.
         figures: In order.
         not_drawn: Figures that hold nothing to be computed, and why, by their numbers in words.
+        about: How its two sides were made, for the head of the report.
     """
 
     name: str
     title: str
     source: str
-    flights: Mapping[str, FlightRow]
+    sources: Mapping[str, Source]
     figures: Sequence[FigureRow]
     not_drawn: Mapping[str, str] = field(default_factory=dict)
+    about: str = "Both sides were given the same data."

@@ -22,9 +22,9 @@ from groundstation.studies.air_table.estimates import (
     rms,
     star_curve,
 )
-from groundstation.studies.flown import Flown
+from groundstation.studies.flown import Flown, Sides
 from groundstation.studies.plots import Axes, Line, over_time
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number, Sides
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number
 
 NAN = math.nan
 SHOWN_S = (0.0, 26.0)

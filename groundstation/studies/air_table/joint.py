@@ -19,9 +19,9 @@ from groundstation.studies.air_table.estimates import (
     off_truth,
     rms,
 )
-from groundstation.studies.flown import Flown
+from groundstation.studies.flown import Flown, Sides
 from groundstation.studies.plots import Axes, Line, over_time
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number, Sides
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number
 
 NAN = math.nan
 MOSTLY_M = 0.05

@@ -9,9 +9,9 @@ import numpy as np
 
 from groundstation.fusion.published_stretch import PublishedStretch, fit_published_stretch
 from groundstation.studies.air_table.estimates import as_flown, off_truth, rms
-from groundstation.studies.flown import Flown
+from groundstation.studies.flown import Flown, Sides
 from groundstation.studies.plots import Axes, Line, over_time
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number, Sides
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number
 
 NAN = math.nan
 ALPHA_M_S2, BETA_M_S2 = 0.005, -0.004

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from groundstation.studies.study import DEFAULT, PUBLISHED, FlightRow
+from groundstation.studies.flown import FlightRow
+from groundstation.studies.study import DEFAULT, PUBLISHED
 
 _HERE = Path(__file__).parents[1]
 RIGS = {PUBLISHED: _HERE / "published.toml", DEFAULT: _HERE / "published_condition.toml"}

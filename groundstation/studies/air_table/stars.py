@@ -14,9 +14,9 @@ from groundstation.star_tracking.delaunay import triangles_of
 from groundstation.star_tracking.star_catalogue import StarCatalogue
 from groundstation.studies.air_table.estimates import Array, star_curve
 from groundstation.studies.air_table.rigs import RIGS
-from groundstation.studies.flown import Flown
+from groundstation.studies.flown import Flown, Sides
 from groundstation.studies.plots import Axes, Line, Plan, over_time
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number, Sides
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Number
 
 NAN = math.nan
 TRIANGLES = 322

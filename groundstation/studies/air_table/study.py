@@ -34,7 +34,7 @@ AIR_TABLE = Study(
         "the Keldysh Institute of Applied Mathematics, Moscow; experiments on the air table of ZARM, "
         "Bremen."
     ),
-    flights=FLIGHTS,
+    sources=FLIGHTS,
     figures=(
         FigureRow(
             (4,),
@@ -127,4 +127,8 @@ AIR_TABLE = Study(
         "Figures 3, 6, 11, 20": "diagrams of the algorithms: they are the code",
         "Figure 5": "an example of a star field, without numbers",
     },
+    about=(
+        "Both sides were flown in a closed loop, so their ways differ a little. t = 0 is when the flight "
+        "begins."
+    ),
 )

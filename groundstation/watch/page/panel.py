@@ -96,6 +96,7 @@ class Panel:
         scale: Of the values.
         label: Of the values, with unit.
         words: Instead of round values: what stands beside values of the scale.
+        along: Name and unit of what lies along the axis of times.
     """
 
     top: float
@@ -105,6 +106,7 @@ class Panel:
     scale: Scale
     label: str
     words: Sequence[tuple[float, str]] | None = None
+    along: str = "t, s"
     _parts: list[str] = field(default_factory=list)
 
     def x(self, t: Array | float) -> Array:
@@ -190,7 +192,7 @@ class Panel:
         frame = [svg.rectangle(LEFT, self.top, right - LEFT, self.height, "frame")]
         frame.append(svg.text(13, middle, self.label, "label", "middle", turn=-90.0))
         if is_last:
-            frame.append(svg.text(right, bottom + 27, "t, s", "tick", "end"))
+            frame.append(svg.text(right, bottom + 27, self.along, "tick", "end"))
         return "".join(
             [*grid, *self._parts, svg.group(self._marks(marks, is_first=is_first), "marks"), *frame]
         )
