@@ -35,7 +35,13 @@ class Painter:
     def __init__(
         self, looks: TargetLooks, points_body_m: Floats, f_px: float, size_px: tuple[int, int], seed: int
     ) -> None:
-        self._looks, self._points, self._f_px, self._size, self._seed = looks, points_body_m, f_px, size_px, seed
+        self._looks, self._points, self._f_px, self._size, self._seed = (
+            looks,
+            points_body_m,
+            f_px,
+            size_px,
+            seed,
+        )
         self._middle = 0.5 * (np.array(size_px) - 1.0)
 
     def pixels(self, points_camera_m: Floats) -> Floats:

@@ -18,9 +18,7 @@ def fly(order: SeparationOrder) -> Separation:
     spin = np.array((0.0, 0.0, rate))
     pace = axes.T @ (order.velocity_orbital_m_s + np.cross(spin, order.position_orbital_m))
     start = Rotation.from_matrix(axes.T @ order.camera_from_orbital.T @ order.camera_from_body)
-    flown = integrate(
-        order.times_s, first, (away, pace), start, order.rate_body_rad_s, order.inertia_kg_m2
-    )
+    flown = integrate(order.times_s, first, (away, pace), start, order.rate_body_rad_s, order.inertia_kg_m2)
     all_axes, rates = flown.orbital_axes()
     held = np.broadcast_to(axes, all_axes.shape) if order.keeps_attitude_in_space else all_axes
     camera = order.camera_from_orbital @ held
@@ -35,6 +33,4 @@ def fly(order: SeparationOrder) -> Separation:
     def picture(number: int) -> Picture:
         return painter.paint(rotations[number], seen[number], float(order.times_s[number]), number)
 
-    return Separation(
-        order.times_s, seen, places, paces, rotations, flown.rates_body_rad_s, pixels, picture
-    )
+    return Separation(order.times_s, seen, places, paces, rotations, flown.rates_body_rad_s, pixels, picture)

@@ -54,7 +54,9 @@ def orbital_axes(places_m: Floats, velocities_m_s: Floats) -> tuple[Floats, Floa
     return np.stack((up, np.cross(normal, up), normal), axis=1), rate
 
 
-def place_in_orbit(semi_major_axis_m: float, eccentricity: float, true_anomaly_rad: float) -> tuple[Floats, Floats]:
+def place_in_orbit(
+    semi_major_axis_m: float, eccentricity: float, true_anomaly_rad: float
+) -> tuple[Floats, Floats]:
     """Return place and velocity, each (3,), of an orbit in the plane x, y with its perigee on +x."""
     p = semi_major_axis_m * (1.0 - eccentricity**2)
     c, s = math.cos(true_anomaly_rad), math.sin(true_anomaly_rad)

@@ -22,8 +22,10 @@ Pure mathematics: arrays and small frozen dataclasses; no bus, no clock, no I/O,
 ``motion``             both together between frames, with process noise
 ``motion_filter``      poses and motion put together; learns how much of the motion is unmodelled
 ``aliasing``           whether the target turns too fast for the frames
+``published_frames``   frames followed as published
 ``tracker``            frames -> ``Track``, one answer per frame
 ``stage_spin``         rates of a stage in regular precession from a few frames
+``stage_evolution``    the same by the published search
 ``error_table``        the published table's statistics beside honest ones
 ``two_line_elements``  relative motion from the NORAD catalogue by SGP4
 =====================  ==================================================================================

@@ -61,7 +61,9 @@ class PublishedFrames:
     def look(self, frame: Frame) -> Track:
         """Take the next frame; times must grow."""
         if self._state is None:
-            return self._begin(frame)
+            if self._settings.guess_of_mass is None:
+                return self._begin(frame)
+            self._state = self._guessed(frame.t_s)
         ahead = self._carried(self._state, frame.t_s)
         matches = self._matches(frame.centres, ahead.pose)
         fit = None
@@ -72,12 +74,24 @@ class PublishedFrames:
         if fit is None or not fit.converged:
             self._state = ahead
             reason = Reason.TOO_FEW_POINTS if fit is None else Reason.NO_SOLUTION
-            return self._track(frame, ahead, Status.PROPAGATED, Reason.NO_POINTS if not len(frame.centres) else reason)
+            return self._track(
+                frame, ahead, Status.PROPAGATED, Reason.NO_POINTS if not len(frame.centres) else reason
+            )
         self._state = self._corrected(frame.t_s, fit)
         self._solved = (frame.t_s, fit)
         return self._track(frame, self._state, Status.SOLVED, Reason.NONE, matches)
 
+    def _guessed(self, t_s: float) -> _State:
+        """The published start: the first prediction is the given one, at rest."""
+        settings = self._settings
+        guess = settings.guess_of_mass
+        assert guess is not None
+        covariance = np.zeros((STATE, STATE))
+        covariance[:6, :6] = settings.guess_covariance()
+        return _State(t_s, guess, np.zeros(3), np.zeros(3), covariance, has_rates=False)
+
     def _begin(self, frame: Frame) -> Track:
+        """Without a guess the first pose is searched for; the publication needs one."""
         candidates = first_poses(frame.centres, self._settings, self._rng)
         if not candidates:
             few = len(frame.centres) < 4

@@ -1,4 +1,4 @@
-"""What a published study is: where its data come from, figures drawn from them, numbers beside published ones.
+"""What a published study is: sources of data, figures drawn from them, numbers beside published ones.
 
 A package adds a study by an entry point of the group ``groundstation.studies`` that names a `Study`.
 """

@@ -6,10 +6,12 @@ from importlib.metadata import entry_points
 
 from groundstation.declarations.errors import UsageError
 from groundstation.studies.air_table.study import AIR_TABLE
+from groundstation.studies.chibis.study import CHIBIS
+from groundstation.studies.evolution.study import DIFFERENTIAL_EVOLUTION
 from groundstation.studies.study import Study
 
 GROUP = "groundstation.studies"
-OWN: tuple[Study, ...] = (AIR_TABLE,)
+OWN: tuple[Study, ...] = (AIR_TABLE, CHIBIS, DIFFERENTIAL_EVOLUTION)
 
 
 def studies() -> dict[str, Study]:

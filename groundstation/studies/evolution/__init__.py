@@ -1,0 +1,1 @@
+"""The study of video navigation with differential evolution: a stage, and two CubeSats."""
