@@ -77,7 +77,8 @@ class Painter:
             root = np.clip(tip, -half_m, half_m)
             ends = np.stack((root, tip)) @ rotation.T + position_m
             radius = 0.5 * looks.antenna_width_m * self._f_px / float(ends[:, 2].mean())
-            _lay(sky, level, *self.pixels(ends), radius)
+            begin, end = self.pixels(ends)
+            _lay(sky, level, begin, end, radius)
         outline = cv2.convexHull(self.pixels(corners @ rotation.T + position_m).astype(np.float32))
         fixed = np.rint(outline * 2.0**_SHIFT).astype(np.int32)
         cover = np.zeros(sky.shape, np.uint8)

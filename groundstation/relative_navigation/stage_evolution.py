@@ -1,7 +1,8 @@
 """Rates of a stage by the published search: differential evolution over its attitude and rate.
 
 Simakov, Ustyugov 2016: parameters are changed until the model's pixels agree with the measured ones. What is
-evolved is not stated; here attitude at time 0 and rate together, over all frames of a run, so that the model of the precession is in the search as it is in the least squares of `stage_spin`.
+evolved is not stated; here attitude at time 0 and rate together, over all frames of a run, so that the model
+of the precession is in the search as it is in the least squares of `stage_spin`.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ ASSUMED = (
 
 
 def camera_axes(tilt_rad: float) -> Floats:
-    """Return ``camera_from_orbital`` of a camera that looks up, tilted backwards; its y is minus the normal."""
+    """Return ``camera_from_orbital`` of a camera that looks up, tilted backwards; its y: minus the normal."""
     forward = np.array((np.cos(tilt_rad), -np.sin(tilt_rad), 0.0))
     down = np.array((0.0, 0.0, -1.0))
     return np.stack((np.cross(down, forward), down, forward))

@@ -1,4 +1,4 @@
-"""The published simulation, filmed and followed; figures 2.10 to 2.14."""
+"""The published simulation, filmed, and followed by both sides."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from drivers.laboratory.separations import Separation, SeparationOrder, fly_separation
 from groundstation.relative_navigation.matching import Centres
-from groundstation.relative_navigation.rotations import rotation_vectors
 from groundstation.relative_navigation.spots import SpotFinder, SpotSettings
 from groundstation.studies.chibis.condition import RATE_RAD_S, simulation
 from groundstation.studies.following import Course, follow, settings_of, tracker_of
-from groundstation.studies.plots import Axes, Line, over_time
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, Generated, Number, Progress
+from groundstation.studies.study import DEFAULT, PUBLISHED, Generated, Progress
 
 Floats = NDArray[np.float64]
 
@@ -79,180 +77,8 @@ def simulate(order: SeparationOrder, progress: Progress, words: str = "filming")
 SIMULATION = Generated(partial(simulate, simulation()), 1.0)
 
 
-def rms(values: Floats) -> float:
-    """Root of the mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")
-
-
-def _inside(found: Simulated, side: str, span_m: tuple[float, float]) -> NDArray[np.bool_]:
-    distances = found.distances_m
-    return (distances >= span_m[0]) & (distances <= span_m[1]) & found.courses[side].is_solved
-
-
-def _later(found: Simulated, side: str, after_s: float) -> int:
-    last = found.last(side)
-    return min(
-        int(np.searchsorted(found.truth.times_s, found.truth.times_s[last] + after_s)),
-        len(found.truth.times_s) - 1,
-    )
-
-
-def draw_course(data: Mapping[str, Simulated]) -> Drawn:
-    """Figures 2.10 and 2.11: where the microsatellite is, and how it is turned."""
-    found = data["simulation"]
-    t_s, truth = found.truth.times_s, found.truth
-    pictures = []
-    for side in SIDES:
-        course = found.courses[side]
-        panels = []
-        for row, (name, unit) in enumerate((("X right", "m"), ("Y down", "m"), ("Z forward", "m"))):
-            lines = [
-                Line("truth", "v2 thick", t_s, truth.positions_camera_m[:, row]),
-                Line(WORDS[side], KINDS[side], t_s, course.positions_m[:, row]),
-            ]
-            panels.append(Axes(f"{name}, {unit}", lines, _span(truth.positions_camera_m[:, row])))
-        turned = np.degrees(np.unwrap(rotation_vectors(truth.camera_from_body), axis=0))
-        answered = np.full_like(turned, np.nan)
-        known = np.isfinite(course.positions_m[:, 0])
-        answered[known] = np.degrees(rotation_vectors(course.camera_from_body[known]))
-        exact = np.degrees(rotation_vectors(truth.camera_from_body))
-        for row, name in enumerate("XYZ"):
-            lines = [
-                Line("truth", "v2 thick", t_s, exact[:, row]),
-                Line(WORDS[side], KINDS[side], t_s, answered[:, row]),
-            ]
-            panels.append(Axes(f"turn {name}, deg", lines, (-200.0, 200.0)))
-        caption = (
-            f"{WORDS[side]}: position and rotation vector in camera axes; dashed: the last solved frame."
-        )
-        marks = (float(t_s[found.last(side)]),)
-        pictures.append((caption, over_time(panels, 0.0, float(t_s[-1]), WORDS[side], marks)))
-    places = truth.positions_orbital_m
-    distances = found.distances_m
-    numbers = [
-        Number(
-            f"distance {metres:g} m is reached at, s",
-            ours=float(np.interp(metres, distances, t_s)),
-            assumed="by the published start; the publication shows a curve without values",
-        )
-        for metres in (5.0, 10.0, 15.0)
-    ]
-    at_end = int(np.argmin(np.abs(distances - 15.0)))
-    angle = float(np.degrees(np.arctan2(-places[at_end, 1], places[at_end, 0])))
-    numbers.append(
-        Number(
-            "off the vertical at 15 m, deg",
-            ours=angle,
-            assumed="a camera that looks straight up needs twice that field",
-        )
-    )
-    words = (
-        "Thrown straight up, the microsatellite falls behind: at 15 m it lies 30 degrees off the vertical. "
-        "Both sides follow it until its tips are smaller than a pixel; then their equations of motion go on "
-        "alone."
-    )
-    return Drawn(pictures, numbers, words)
-
-
-def _span(values: Floats) -> tuple[float, float]:
-    low, high = float(values.min()), float(values.max())
-    room = 0.1 * (high - low) + 0.3
-    return low - room, high + room
-
-
-def draw_errors(data: Mapping[str, Simulated]) -> Drawn:
-    """Figures 2.12, 2.13 and 2.14: errors against time, before and after the tips are lost."""
-    found = data["simulation"]
-    t_s = found.truth.times_s
-    pictures = [
-        (
-            "Errors against time; dashed: last solved frames.",
-            _error_picture(found, t_s, "t, s", tuple(float(t_s[found.last(side)]) for side in SIDES)),
-        ),
-        (
-            "The same against distance, up to the last solved frame.",
-            _error_picture(found, found.distances_m, "distance, m", (3.0, 15.0), until_last=True),
-        ),
-    ]
-    near = [rms(found.courses[side].away_m[_inside(found, side, NEAR_M)]) for side in SIDES]
-    far = [rms(found.courses[side].away_m[_inside(found, side, FAR_M)]) for side in SIDES]
-    turned = [rms(found.courses[side].away_deg[_inside(found, side, FAR_M)]) for side in SIDES]
-    stated = "the published camera and tips are not stated, so they are not compared"
-    numbers = [
-        Number.beside("position error up to 3.5 m, m rms", 0.01, near, f"published at about 3 m; {stated}"),
-        Number.beside("position error at 13.5 to 15 m, m rms", 0.4, far, f"published near 15 m; {stated}"),
-        Number.beside(
-            "attitude error at 13.5 to 15 m, deg rms", 4.0, turned, f"published as a limit; {stated}"
-        ),
-        Number.beside(
-            "position error far over near, times",
-            40.0,
-            [one / other for one, other in zip(far, near, strict=True)],
-            "the bound for a fixed pixel error grows as the distance squared, 20 times between these "
-            "distances",
-            2.0,
-        ),
-        Number.beside(
-            "distance at the last solved frame, m",
-            15.0,
-            [float(found.distances_m[found.last(side)]) for side in SIDES],
-            "the size of the tips was chosen for it",
-            1.2,
-            is_put_in=True,
-        ),
-        Number.beside(
-            "tip at the last solved frame, px",
-            1.0,
-            [tip_px(found, side) for side in SIDES],
-            "published: below one pixel a point is not recognised",
-            1.3,
-        ),
-    ]
-    numbers += [
-        Number.beside(
-            f"{what} error {after_s:g} s after the last solved frame, {unit}",
-            float("nan"),
-            [float(pick(found.courses[side])[_later(found, side, after_s)]) for side in SIDES],
-            "published: the state leaves the true one, without a number",
-        )
-        for after_s in (40.0, 100.0)
-        for what, unit, pick in (
-            ("position", "m", lambda course: course.away_m),
-            ("attitude", "deg", lambda course: course.away_deg),
-        )
-    ]
-    words = (
-        "The error grows as the square of the distance and the more the fewer pixels a tip has, and no "
-        "faster: nothing in it is exponential. Rates by differences of two poses carry their errors into "
-        "what is propagated after the tips are lost; a filter's rates hold far longer."
-    )
-    return Drawn(pictures, numbers, words)
-
-
 def tip_px(found: Simulated, side: str, number: int | None = None) -> float:
     """Diameter of a tip in a picture; in the last one that a side could use if none is named."""
     order = found.order
     depth = float(found.truth.positions_camera_m[found.last(side) if number is None else number, 2])
     return order.f_px * order.looks.tip_diameter_m / depth
-
-
-def _error_picture(
-    found: Simulated, along: Floats, name: str, marks: tuple[float, ...], *, until_last: bool = False
-) -> str:
-    rows: list[tuple[str, list[Line]]] = [
-        ("position, m", []),
-        ("attitude, deg", []),
-        ("all six, m and q", []),
-    ]
-    tops = [0.0, 0.0, 0.0]
-    for side in SIDES:
-        course = found.courses[side]
-        stop = found.last(side) + 1 if until_last else len(along)
-        six = np.hypot(course.away_m, np.sin(0.5 * np.radians(course.away_deg)))
-        for row, values in enumerate((course.away_m, course.away_deg, six)):
-            rows[row][1].append(Line(WORDS[side], KINDS[side], along[:stop], values[:stop]))
-            solved = values[: found.last(side) + 1]
-            tops[row] = max(tops[row], 1.5 * float(np.nanmax(solved)))
-    panels = [Axes(label, lines, (0.0, top)) for (label, lines), top in zip(rows, tops, strict=True)]
-    start = float(along[0])
-    return over_time(panels, start, float(along[-1]), f"errors against {name}", marks, name)

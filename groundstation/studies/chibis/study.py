@@ -5,8 +5,10 @@ from __future__ import annotations
 from groundstation.studies.chibis import condition, orbits, video
 from groundstation.studies.chibis.orbits import draw_orbits
 from groundstation.studies.chibis.robustness import draw_reference_points
-from groundstation.studies.chibis.simulation import SIMULATION, draw_course, draw_errors
-from groundstation.studies.chibis.video import FILM, draw_frames, draw_motion
+from groundstation.studies.chibis.simulation import SIMULATION
+from groundstation.studies.chibis.simulation_figures import draw_course, draw_errors
+from groundstation.studies.chibis.video import FILM
+from groundstation.studies.chibis.video_figures import draw_frames, draw_motion
 from groundstation.studies.chibis.working_time import LIMIT, WORKING_TIMES, draw_working_time
 from groundstation.studies.study import FigureRow, Study
 

@@ -14,6 +14,7 @@ from groundstation.relative_navigation.evolution import EvolutionSettings
 from groundstation.relative_navigation.evolved_pose import EvolvedPose
 from groundstation.relative_navigation.levenberg import solve_levenberg
 from groundstation.relative_navigation.matching import Centres
+from groundstation.relative_navigation.motion_models import Tracker
 from groundstation.relative_navigation.published_frames import PublishedFrames
 from groundstation.relative_navigation.tracker import MotionTracker
 from groundstation.studies.evolution.stage import ORBIT_RAD_S, RADIUS_M
@@ -112,7 +113,7 @@ def separate(progress: Progress, end_s: float = LONG_S, seed: int = 4) -> Separa
     centres = [Centres(pixels, spread, np.arange(count), SIGMA_PX) for pixels in noisy]
     settings = settings_of(order, truth, rate_rad_s=ORBIT_RAD_S)
     evolved = EvolvedPose(EVOLUTION, np.random.default_rng([seed, 1]))
-    trackers = {
+    trackers: dict[str, Tracker] = {
         PUBLISHED: PublishedFrames(settings, evolved),
         DEFAULT: MotionTracker(settings, solve_levenberg),
     }

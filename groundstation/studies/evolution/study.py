@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from groundstation.studies.evolution import cubesats, stage
+from groundstation.studies.evolution import cubesats, stage, stage_figures
 from groundstation.studies.study import FigureRow, Study
 
 DIFFERENTIAL_EVOLUTION = Study(
@@ -20,14 +20,14 @@ DIFFERENTIAL_EVOLUTION = Study(
             "Formulas (1) for H = 380 km, In = 14406, Ix = 2548 kg m^2, w = (-2.5, 1, 1) deg/s; results are "
             "not printed.",
             (),
-            stage.draw_precession,
+            stage_figures.draw_precession,
         ),
         FigureRow(
             (3,),
             "distribution of the errors of the stage's rates",
             "Three histograms of 500 runs.",
             ("stage",),
-            stage.draw_histograms,
+            stage_figures.draw_histograms,
             stage.ASSUMED,
         ),
         FigureRow(
@@ -36,7 +36,7 @@ DIFFERENTIAL_EVOLUTION = Study(
             "M = 0.10, 0.20, 0.14 deg/s; D = 3.5e-5, 1.17e-4, 6.3e-5 deg^2/s^2; sigma = 0.012, 0.010, 0.021 "
             "deg/s.",
             ("stage",),
-            stage.draw_table,
+            stage_figures.draw_table,
             stage.ASSUMED,
             kind="table",
         ),
