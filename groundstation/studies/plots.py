@@ -57,11 +57,13 @@ class Axes:
         label: Of the values, with unit.
         lines: Drawn in order.
         span: Of the values; what the lines need if None.
+        is_log: Equal ratios are equally long; it needs a span.
     """
 
     label: str
     lines: Sequence[Line]
     span: tuple[float, float] | None = None
+    is_log: bool = False
 
 
 def over_time(
@@ -86,7 +88,7 @@ def over_time(
     top = TOP
     for axes in panels:
         span = axes.span or _span(axes.lines, start_s, stop_s)
-        panel = Panel(top, PANEL_HEIGHT, start_s, stop_s, Scale(*span), axes.label, along=along)
+        panel = Panel(top, PANEL_HEIGHT, start_s, stop_s, Scale(*span, axes.is_log), axes.label, along=along)
         for moment in marks_s:
             if start_s <= moment <= stop_s:
                 x = float(panel.x(moment))
@@ -115,10 +117,12 @@ class Plan:
     Attributes:
         x_span_m: Left and right edge.
         y_span_m: Lower and upper edge.
+        names: What lies along the two axes.
     """
 
     x_span_m: tuple[float, float]
     y_span_m: tuple[float, float]
+    names: tuple[str, str] = ("x, m", "y, m")
 
     @property
     def _scale(self) -> float:
@@ -179,6 +183,6 @@ class Plan:
             y = float(self.place(0.0, tick)[1])
             around.append(svg.line(left, y, right, y, "grid"))
             around.append(svg.text(left - 5.0, y + 3.5, tick_word(tick), "tick", "end"))
-        around.append(svg.text(right, bottom + 27.0, "x, m", "tick", "end"))
-        around.append(svg.text(left - 40.0, top + 8.0, "y, m", "tick"))
+        around.append(svg.text(right, bottom + 27.0, self.names[0], "tick", "end"))
+        around.append(svg.text(left - 40.0, top + 8.0, self.names[1], "tick"))
         return svg.picture([*legend(entries, 14.0), *around, *parts], WIDTH, bottom + 32.0, label)

@@ -21,3 +21,23 @@ def test_the_zero_offset_study_finds_what_the_rest_was_disturbed_by(groundstatio
     assert recordings == ["pulses_default.mcap", "pulses_published.mcap"]
     with Recording(tmp_path / "flights" / recordings[1]) as recording:
         assert 'identification = "published"' in recording.info.rig_toml
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("study", "figure", "words"),
+    [
+        ("chibis", "2.12", "position error at 13.5 to 15 m, m rms"),
+        ("chibis", "3.6", "length of the rate by video, deg/s"),
+        ("differential-evolution", "2", "mean error of psi, 30 s, rad"),
+    ],
+)
+def test_figures_of_relative_navigation_are_made_from_the_installed_emulator(
+    groundstation, tmp_path, study, figure, words
+):
+    groundstation("reproduce", study, "--out", tmp_path, "--figure", figure)
+    rows = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    (row,) = [row for row in rows if row["quantity"] == words]
+    assert row["ours"] > 0.0
+    assert row["assumed"]
+    assert not (tmp_path / "flights").exists()

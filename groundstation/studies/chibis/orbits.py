@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers.laboratory.separations import SeparationOrder, fly_separation
 from groundstation.relative_navigation.hill import HillConstants, hill_constants, hill_transition
 from groundstation.studies.chibis.condition import INERTIA_KG_M2, RATE_RAD_S, SEMI_MAJOR_AXIS_M, TIPS_M
-from groundstation.studies.plots import Axes, Line, over_time
+from groundstation.studies.plots import Plan
 from groundstation.studies.study import Drawn, Number
 
 Floats = NDArray[np.float64]
@@ -77,18 +77,8 @@ def draw_orbits(data: Mapping[str, Any]) -> Drawn:
     for c1 in (0.0, C1_M):
         found = relative_orbit(c1)
         words = f"C1 = {c1:g} m"
-        panels = [
-            Axes(
-                label,
-                [
-                    Line("integrated", "v2 thick", found.times_s, found.integrated_m[:, row]),
-                    Line("Hill's closed form", "v1", found.times_s, found.closed_m[:, row]),
-                ],
-            )
-            for row, label in ((1, "along-track, m"), (0, "up, m"))
-        ]
         pictures.append(
-            (f"{words}, three revolutions.", over_time(panels, 0.0, float(found.times_s[-1]), words))
+            (f"{words}, three revolutions; the asterisk is the craft with the camera.", _plane(found, words))
         )
         turn = len(found.times_s) // 3
         drift = found.integrated_m[turn, 1] - found.integrated_m[0, 1]
@@ -96,7 +86,7 @@ def draw_orbits(data: Mapping[str, Any]) -> Drawn:
         numbers += [
             Number(
                 f"{words}: wanders along the track, m a revolution",
-                ours=found.constants.drift_m_rev,
+                ours=found.constants.drift_m_rev + 0.0,
                 default=float(drift),
                 assumed="-6 pi C1; default: both craft integrated",
             ),
@@ -121,3 +111,20 @@ def draw_orbits(data: Mapping[str, Any]) -> Drawn:
         "micrometres."
     )
     return Drawn(pictures, numbers, sentences)
+
+
+def _plane(found: RelativeOrbit, words: str) -> str:
+    """The plane of the orbit: along-track to the right, up."""
+    along, up = found.integrated_m[:, 1], found.integrated_m[:, 0]
+    room = 0.3
+    plan = Plan(
+        (float(along.min()) - room, float(along.max()) + room),
+        (float(up.min()) - room, float(up.max()) + room),
+        ("along-track, m", "up, m"),
+    )
+    parts = [
+        plan.way(along, up, "v2 thick"),
+        plan.way(found.closed_m[:, 1], found.closed_m[:, 0], "v1"),
+        plan.asterisks(np.zeros(1), np.zeros(1), "v5"),
+    ]
+    return plan.picture(parts, (("v2 thick", "integrated"), ("v1", "Hill's closed form")), words)

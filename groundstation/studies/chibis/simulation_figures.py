@@ -177,20 +177,17 @@ def _away_deg(course: Course) -> Floats:
 def _error_picture(
     found: Simulated, along: Floats, name: str, marks: tuple[float, ...], *, until_last: bool = False
 ) -> str:
-    rows: list[tuple[str, list[Line]]] = [
-        ("position, m", []),
-        ("attitude, deg", []),
-        ("all six, m and q", []),
+    rows: list[tuple[str, list[Line], tuple[float, float]]] = [
+        ("position, m", [], (1e-4, 10.0)),
+        ("attitude, deg", [], (1e-3, 100.0)),
+        ("all six, m and q", [], (1e-4, 10.0)),
     ]
-    tops = [0.0, 0.0, 0.0]
     for side in SIDES:
         course = found.courses[side]
         stop = found.last(side) + 1 if until_last else len(along)
         six = np.hypot(course.away_m, np.sin(0.5 * np.radians(course.away_deg)))
-        for row, values in enumerate((course.away_m, course.away_deg, six)):
-            rows[row][1].append(Line(WORDS[side], KINDS[side], along[:stop], values[:stop]))
-            solved = values[: found.last(side) + 1]
-            tops[row] = max(tops[row], 1.5 * float(np.nanmax(solved)))
-    panels = [Axes(label, lines, (0.0, top)) for (label, lines), top in zip(rows, tops, strict=True)]
+        for (_, lines, _), values in zip(rows, (course.away_m, course.away_deg, six), strict=True):
+            lines.append(Line(WORDS[side], KINDS[side], along[:stop], values[:stop]))
+    panels = [Axes(label, lines, span, is_log=True) for label, lines, span in rows]
     start = float(along[0])
     return over_time(panels, start, float(along[-1]), f"errors against {name}", marks, name)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from groundstation.studies.chibis import condition, orbits, video
+from groundstation.studies.chibis import condition, orbits, video, working_time
 from groundstation.studies.chibis.orbits import draw_orbits
 from groundstation.studies.chibis.robustness import draw_reference_points
 from groundstation.studies.chibis.simulation import SIMULATION
 from groundstation.studies.chibis.simulation_figures import draw_course, draw_errors
 from groundstation.studies.chibis.video import FILM
 from groundstation.studies.chibis.video_figures import draw_frames, draw_motion
-from groundstation.studies.chibis.working_time import LIMIT, WORKING_TIMES, draw_working_time
+from groundstation.studies.chibis.working_time import WORKING_TIMES, draw_working_time
 from groundstation.studies.study import FigureRow, Study
 
 CHIBIS = Study(
@@ -63,7 +63,7 @@ CHIBIS = Study(
             "exists; focal length, field of view and chip matter likewise.",
             ("working times",),
             draw_working_time,
-            (*condition.ASSUMED, LIMIT, "a picture every 8 s; 40 s without a solved frame end the work"),
+            (*condition.ASSUMED, *working_time.ASSUMED),
         ),
         FigureRow(
             ("3.3", "3.4", "3.5"),

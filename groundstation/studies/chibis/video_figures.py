@@ -24,11 +24,13 @@ from groundstation.studies.chibis.video import (
     Filmed,
 )
 from groundstation.studies.following import Course
-from groundstation.studies.photographs import asterisks, crosses, outlines, photograph
+from groundstation.studies.photographs import Photograph, column, side_by_side
 from groundstation.studies.plots import Axes, Line, over_time
 from groundstation.studies.study import PUBLISHED, Drawn, Number
 
 Floats = NDArray[np.float64]
+
+GLARE_SHOWN_S = 3.1
 
 
 def draw_frames(data: Mapping[str, Filmed]) -> Drawn:
@@ -43,20 +45,23 @@ def draw_frames(data: Mapping[str, Filmed]) -> Drawn:
     start = camera.project(guess.points_camera_m(TIPS_M))
     here = camera.project(TIPS_M @ course.camera_from_body[0].T + course.positions_m[0])
     first = found.truth.picture(0)
-    glare = found.truth.picture(found.frames - 1)
+    glare = found.truth.picture(int(np.searchsorted(found.truth.times_s[: found.frames], GLARE_SHOWN_S)))
     box = (0, 0, *SIZE_PX)
-    paths = [blob.outline for blob in blobs_of(picture, published_level(picture, LEVEL))]
+    plain, halves = Photograph(picture, box, column(2)), Photograph(binary, box, column(2))
+    halves.outlines([blob.outline for blob in blobs_of(picture, published_level(picture, LEVEL))], "v1")
+    marked, blinded = Photograph(first, box, column(2)), Photograph(glare, box, column(2))
+    marked.asterisks(start, "v1")
+    marked.crosses(here, "v0")
     pictures = [
-        (f"Figure 3.3: the frame at {number * FRAME_S:.1f} s.", photograph(picture, [], "a frame", box)),
         (
-            "Figure 3.4: the binary picture, and its boundaries.",
-            photograph(binary, [outlines(paths, "v1")], "binary frame", box),
+            f"At {number * FRAME_S:.1f} s. Figure 3.3: a frame; 3.4: the binary picture and its boundaries.",
+            side_by_side((plain, halves), "a frame, and the binary one"),
         ),
         (
-            "Figure 3.5: asterisks: the first guess; crosses: estimate by Newton's method.",
-            photograph(first, [asterisks(start, "v1"), crosses(here, "v0", 6.0)], "guess and estimate", box),
+            "Figure 3.5: asterisks: the first guess; crosses: estimate by Newton's method. Right: at 3.1 s "
+            "the glare of the body hides the tips.",
+            side_by_side((marked, blinded), "guess and estimate; glare"),
         ),
-        ("The last frame: the glare of the body hides the tips.", photograph(glare, [], "glare", box)),
     ]
     gap = float(np.sqrt(np.mean(np.sum((start - found.truth.pixels[0]) ** 2, axis=1))))
     left = float(np.sqrt(np.mean(np.sum((here - found.truth.pixels[0]) ** 2, axis=1))))

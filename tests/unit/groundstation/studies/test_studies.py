@@ -17,7 +17,7 @@ from groundstation.studies.flown import FlightRow
 from groundstation.studies.page import render_page
 from groundstation.studies.plots import Axes, Line, Plan, over_time
 from groundstation.studies.running import reproduce, results_of
-from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, FigureRow, Number, Study
+from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, FigureRow, Generated, Number, Study
 
 DRAWN = Drawn(
     [("A line <here>.", "<svg></svg>")],
@@ -135,7 +135,7 @@ class Point:
 
 def test_a_package_adds_a_study(monkeypatch):
     monkeypatch.setattr(table, "entry_points", lambda group: [Point(STUDY)])
-    assert list(table.studies()) == ["air-table", "made"]
+    assert list(table.studies()) == ["air-table", "chibis", "differential-evolution", "made"]
 
 
 @pytest.mark.parametrize(
@@ -160,6 +160,7 @@ def test_studies_are_listed_and_what_is_not_there_is_named(groundstation, tmp_pa
         (("nothing",), "there is no study 'nothing'"),
         (("air-table",), "--out is needed"),
         (("air-table", "--out", tmp_path, "--figure", "12"), "has no figure 12"),
+        (("chibis", "--out", tmp_path, "--figure", "2.3"), "has no figure 2.3"),
         (("--figure", "8"), "name a study"),
     ):
         with pytest.raises(UsageError, match=sentence):
@@ -172,6 +173,39 @@ def test_a_figure_that_needs_no_flight_is_drawn_alone(groundstation, tmp_path):
     rows = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     triangles = next(row for row in rows if "triangles" in row["quantity"])
     assert (triangles["published"], triangles["ours"], triangles["comes_out"]) == (322, 348, False)
+
+
+def test_a_figure_is_named_as_it_is_printed(groundstation, tmp_path):
+    groundstation("reproduce", "chibis", "--out", tmp_path, "--figure", "2.1")
+    rows = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert {row["figure"] for row in rows} == {"2.1, 2.2"}
+    assert 'id="figure-2.1"' in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_generated_data_are_made_once_and_progress_grows(tmp_path):
+    calls = []
+
+    def make(progress):
+        calls.append(1)
+        progress("making", 0.5)
+        return 7
+
+    def draw(data):
+        assert data == {"numbers": 7}
+        return DRAWN
+
+    rows = tuple(replace(ROW, numbers=(f"1.{k}",), needs=("numbers",), draw=draw) for k in (1, 2))
+    sources = {"numbers": Generated(make, 3.0), "other": Generated(lambda _: 1 / 0)}
+    said = []
+    study = replace(STUDY, sources=sources, figures=rows, about="By hand.")
+    reproduce(study, rows, tmp_path, lambda text, done: said.append((text, done)))
+    assert calls == [1]
+    assert said == [
+        ("making", 0.375),
+        ("drawing figure 1.1", 0.75),
+        ("drawing figure 1.2", 0.875),
+    ]
+    assert "By hand." in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_picture_over_time_holds_lines_dots_and_marks():
