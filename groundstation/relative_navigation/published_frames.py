@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from groundstation.relative_navigation.answers import NOTHING3, Reason, Status, Track, lost
 from groundstation.relative_navigation.first_poses import enough, first_poses
 from groundstation.relative_navigation.matching import Centres, Matches, match_labelled, match_near
-from groundstation.relative_navigation.motion import POSITION, RATE, STATE, TURN, VELOCITY, Motions, advance
+from groundstation.relative_navigation.motion import POSITION, RATE, TURN, VELOCITY
+from groundstation.relative_navigation.motion_bank import SPEED, SPIN, MotionBank
 from groundstation.relative_navigation.pixel_equations import predicted_pixels
 from groundstation.relative_navigation.pose import Pose, PoseFit
 from groundstation.relative_navigation.rotations import rotation_vector
@@ -37,11 +38,12 @@ class _State:
     """What is carried on: of the centre of mass, with the covariance of its 15 errors."""
 
     t_s: float
-    pose: Pose
-    velocity_m_s: Floats
-    rate_rad_s: Floats
-    covariance: Floats
+    bank: MotionBank
     has_rates: bool
+
+    @property
+    def pose(self) -> Pose:
+        return self.bank.pose(0)
 
 
 class PublishedFrames:
@@ -86,9 +88,7 @@ class PublishedFrames:
         settings = self._settings
         guess = settings.guess_of_mass
         assert guess is not None
-        covariance = np.zeros((STATE, STATE))
-        covariance[:6, :6] = settings.guess_covariance()
-        return _State(t_s, guess, np.zeros(3), np.zeros(3), covariance, has_rates=False)
+        return _State(t_s, MotionBank.at(1, guess, settings.guess_covariance()), has_rates=False)
 
     def _begin(self, frame: Frame) -> Track:
         """Without a guess the first pose is searched for; the publication needs one."""
@@ -103,18 +103,9 @@ class PublishedFrames:
 
     def _carried(self, state: _State, t_s: float) -> _State:
         """The state at another time, by the equations of motion alone."""
-        motions = Motions(
-            state.pose.camera_from_body[None],
-            state.pose.position_camera_m[None],
-            state.velocity_m_s[None],
-            state.rate_rad_s[None],
-            np.zeros((1, 3)),
-        )
-        settings = self._settings
-        after, carry = advance(motions, settings.craft, settings.target.inertia_kg_m2, state.t_s, t_s)
-        covariance = carry[0] @ state.covariance @ carry[0].T
-        pose = Pose(after.rotation[0], after.position_m[0])
-        return _State(t_s, pose, after.velocity_m_s[0], after.rate_rad_s[0], covariance, state.has_rates)
+        bank, settings = state.bank.copy(), self._settings
+        bank.predict(settings.craft, settings.target.inertia_kg_m2, state.t_s, t_s, np.zeros((1, 3)))
+        return _State(t_s, bank, state.has_rates)
 
     def _matches(self, centres: Centres, pose: Pose) -> Matches:
         settings = self._settings
@@ -129,10 +120,9 @@ class PublishedFrames:
 
     def _corrected(self, t_s: float, fit: PoseFit) -> _State:
         """The state that a solved frame gives: its pose, and rates by differences to the last solved one."""
-        covariance = np.zeros((STATE, STATE))
-        covariance[:6, :6] = fit.covariance
+        bank = MotionBank.at(1, fit.pose, fit.covariance)
         if self._solved is None:
-            return _State(t_s, fit.pose, np.zeros(3), np.zeros(3), covariance, has_rates=False)
+            return _State(t_s, bank, has_rates=False)
         begin_s, last = self._solved
         dt, craft = t_s - begin_s, self._settings.craft
         begin, end = craft.camera_from_orbital(begin_s), craft.camera_from_orbital(t_s)
@@ -144,11 +134,13 @@ class PublishedFrames:
         velocity = end.T @ now[:3, :3] @ end + begin.T @ before[:3, :3] @ begin
         c, d = fit.pose.camera_from_body, last.pose.camera_from_body
         rate = c.T @ now[3:, 3:] @ c + d.T @ before[3:, 3:] @ d
+        covariance = bank.covariances[0]
         covariance[VELOCITY, VELOCITY], covariance[RATE, RATE] = velocity, rate
         for part, other, by in ((POSITION, VELOCITY, end), (TURN, RATE, c)):
             covariance[part, other] = fit.covariance[part, part] @ by / dt
             covariance[other, part] = covariance[part, other].T
-        return _State(t_s, fit.pose, way / dt, rotation_vector(turned) / dt, covariance, has_rates=True)
+        bank.states[0, SPEED], bank.states[0, SPIN] = way / dt, rotation_vector(turned) / dt
+        return _State(t_s, bank, has_rates=True)
 
     def _track(
         self, frame: Frame, state: _State, status: Status, reason: Reason, matches: Matches | None = None
@@ -169,9 +161,9 @@ class PublishedFrames:
             status,
             reason,
             state.pose.shifted(-settings.target.offset_m),
-            state.covariance[:6, :6],
-            state.velocity_m_s if known else NOTHING3,
-            state.rate_rad_s if known else NOTHING3,
+            state.bank.covariances[0, :6, :6].copy(),
+            state.bank.states[0, SPEED].copy() if known else NOTHING3,
+            state.bank.states[0, SPIN].copy() if known else NOTHING3,
             count,
             residual,
             matched=pairs,
