@@ -27,6 +27,8 @@ _OF_LARGEST = 0.3
 _HARD_PUSH = 1.7
 _CALM_BLOCKS = 10
 _LONGEST_PUSH_BLOCKS = 50
+_DOUBTED_BLOCKS = 10
+"""So many are not judged after a moment at which commands may have reached the node late."""
 """After a shock valves are not accused while forces go on, but not for longer than this."""
 _IS_CONSTANT = 0.95
 
@@ -108,7 +110,7 @@ class ValveConsistency:
         self._begin()
 
     def _begin(self) -> None:
-        self._calm_after = self._pushed_blocks = 0
+        self._calm_after = self._pushed_blocks = self._doubted_blocks = 0
         self._unexplained = 0.0
         self._inquiry.forget()
         self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
@@ -159,6 +161,10 @@ class ValveConsistency:
         self._take(block, stamp_ns)
         return before != (self._valve_findings, self._shifted, self._pushed)
 
+    def doubt(self) -> None:
+        """Judge nothing for a fifth of a second: what was commanded may have been carried out late."""
+        self._doubted_blocks = _DOUBTED_BLOCKS
+
     def findings(self, now_ns: int) -> tuple[Finding, ...]:
         """What was found: valves and sensors until `reset`, pushes for two seconds."""
         found = self._valve_findings + self._shifted
@@ -168,6 +174,10 @@ class ValveConsistency:
 
     def _take(self, block: Block, stamp_ns: int) -> None:
         misfit = self._fit.compare(block)
+        if self._doubted_blocks:
+            self._doubted_blocks -= 1
+            self._fit.lose_rate()
+            return
         x, y = misfit.force_m_s2
         size = math.hypot(x, y)
         sigma = math.sqrt(misfit.force_variance)

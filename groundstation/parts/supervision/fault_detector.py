@@ -12,6 +12,7 @@ from groundstation.parts.imu.messages import USABLE_RATE, Imu
 from groundstation.parts.stars.messages import PictureTrouble
 from groundstation.parts.supervision.messages import Findings, Supervision, ValveShares
 from groundstation.parts.valves.messages import ValveCommand, ValveStatus
+from groundstation.supervision.command_lag import CommandLag
 from groundstation.supervision.fix_watch import FixWatch
 from groundstation.supervision.imu_consistency import ImuConsistency
 from groundstation.supervision.imu_watch import ImuWatch
@@ -27,7 +28,7 @@ LONGEST_HOLE_MS, DISTURBED_NS = 60, 2_000_000_000
 """After a longer hole between samples nothing is judged for a while: filter and stamps settle."""
 VALVES = 8
 """Of a valve node."""
-MOST_BEHIND, COUNTER_MODULUS = 3, 16
+MOST_BEHIND = 3
 """Commands, 20 ms each, that the node may be behind."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
@@ -72,7 +73,8 @@ class FaultDetector(Node):
         self._hold_up = hold_up
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
-        self._node_ns = self._sent = 0
+        self._node_ns = 0
+        self._lag = CommandLag()
         self._disturbed_ns = -DISTURBED_NS
         self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
         self._health: Mapping[int, ValveHealth] = {}
@@ -85,12 +87,17 @@ class FaultDetector(Node):
                 if self._sample(message, now_ns):
                     yield from self._report(now_ns)
             case ValveCommand():
-                self._sent = message.counter
+                self._lag.command(message.stamp_ns, message.counter)
                 if self._floats_from_ns is not None:
                     self._valves.command(message.stamp_ns, message.pulse_id, message.on_time_ms)
             case ValveStatus():
-                behind = (self._sent - message.counter) % COUNTER_MODULUS
-                if message.armed and not message.dead_man and behind <= MOST_BEHIND:
+                if self._lag.is_late(message.stamp_ns, message.counter):
+                    self._valves.doubt()
+                if (
+                    message.armed
+                    and not message.dead_man
+                    and self._lag.behind(message.counter) <= MOST_BEHIND
+                ):
                     self._node_ns = now_ns
             case PoseFix():
                 self._fix(message, now_ns)

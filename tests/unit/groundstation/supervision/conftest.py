@@ -43,6 +43,7 @@ class Truth:
     pulsing: dict[int, tuple[float, int, int]] = field(default_factory=dict)  # from when, on ms, period ms
     push: tuple[float, float, float, float] | None = None  # from, to, fx, fy (N, body)
     shift: tuple[float, float, float] | None = None  # from, x, y
+    late_ms: np.ndarray | None = None  # of each period: how late its command reaches the valves
 
     @classmethod
     def drawn(cls, rng, **more):
@@ -96,6 +97,8 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None)
     steps = chosen.shape[0] * PERIOD_MS
     felt = np.zeros((steps, 8))
     start = np.arange(chosen.shape[0]) * PERIOD_MS
+    if truth.late_ms is not None:
+        start = start + truth.late_ms
     grid = np.arange(steps)
     open_ms, close_ms = np.broadcast_to(truth.open_ms, 8), np.broadcast_to(truth.close_ms, 8)
     for valve in range(8):
@@ -158,6 +161,9 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None)
         while (period + 1) * PERIOD_MS < end_ms:
             period += 1
             detector.command(period * PERIOD_MS * 1_000_000, (period + 1) % 16, rows[period])
+        since_ms = end_ms - period * PERIOD_MS
+        if truth.late_ms is not None and 10 < since_ms <= truth.late_ms[period] and end_ms % 20 == 0:
+            detector.doubt()  # a status, each 20 ms, names the command before
         stamp_ns = end_ms * 1_000_000
         if detector.sample(stamp_ns, window_s, rates[sample], tuple(forces[sample])):
             yield end_ms * 1e-3, detector.findings(stamp_ns)

@@ -298,6 +298,28 @@ def test_healthy_mock_ups_with_all_that_is_not_known_of_them_are_not_accused(air
     assert max(case.evidence for case in detector._suspicions.cases) < 0.5 * detector.threshold
 
 
+@pytest.mark.parametrize("late_ms", [40, 80])
+def test_valves_are_not_accused_of_commands_that_reach_them_late(air, late_ms):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        truth = air.Truth.drawn(rng)
+        chosen = air.commands(rng, 300, truth, busy=0.95)
+        truth.late_ms = np.where(rng.random(300) < 0.1, np.round(late_ms * rng.random(300)), 0).astype(int)
+        assert list(air.fly(air.make_detector(), rng, truth, chosen, period_ms=10)) == []
+
+
+def test_a_valve_is_named_between_late_commands(air):
+    named = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        truth = air.Truth.drawn(rng, open={5: (FAULT_MS, 1.0)})
+        chosen = air.commands(rng, 160, truth)
+        truth.late_ms = np.where(rng.random(160) < 0.1, np.round(60 * rng.random(160)), 0).astype(int)
+        found = list(air.fly(air.make_detector(), rng, truth, chosen, period_ms=10))
+        named += [each.id for each in found[0][1]] == ["valve_stuck_open"] and found[0][0] < FAULT_S + 1.0
+    assert named >= 7
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_another_order_of_the_valves_names_the_same_valve(air, seed):
     order = np.random.default_rng(seed).permutation(8)
