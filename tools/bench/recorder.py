@@ -319,10 +319,16 @@ def _lost(path: Path, sent: dict[tuple[str, str], int]) -> tuple[int, int]:
 
 
 def _missing_s(path: Path, killed_ns: int) -> float:
-    """From the newest state of the vehicle that lost most until the kill."""
+    """From the newest message of the vehicle that lost most until the kill.
+
+    Of any topic: what was flown before begins anew every few seconds, without a state for its first moments.
+    """
+    newest_ns: dict[str, int] = {}
     with Recording(path) as recording:
-        newest = recording.newest([PAYLOADS["state"]], 1 << 63)
-    return max((killed_ns - message.envelope.publish_ns) * 1e-9 for message in newest)
+        for message in recording.newest(PAYLOADS.values(), 1 << 63):
+            owner, at_ns = message.envelope.owner, message.envelope.publish_ns
+            newest_ns[owner] = max(at_ns, newest_ns.get(owner, 0))
+    return max((killed_ns - newest_ns[name]) * 1e-9 for name in WITH_CAMERA)
 
 
 def cpu_s(pid: int) -> float:
