@@ -76,4 +76,4 @@ def results_of(drawn: Sequence[tuple[FigureRow, Drawn]]) -> list[dict[str, Any]]
 
 
 def _plain(value: float) -> float | None:
-    return round(value, 6) if math.isfinite(value) else None
+    return float(f"{value:.6g}") if math.isfinite(value) else None
