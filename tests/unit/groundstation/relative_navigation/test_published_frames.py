@@ -54,10 +54,14 @@ def test_without_points_the_last_motion_goes_on_with_its_errors():
         assert turn.magnitude() < 4.0 * track.sigma_attitude_rad
     sigmas = [track.sigma_position_m for track in tracks[29:]]
     assert np.all(np.diff(sigmas) > 0.0)
+    now, before = (track.covariance[:3, :3] for track in (last, tracks[28]))
+    for steps in (1, 10):  # of x29 + steps (x29 - x28)
+        exact = (1 + steps) ** 2 * now + steps**2 * before
+        np.testing.assert_allclose(tracks[29 + steps].covariance[:3, :3], exact, rtol=1e-6, atol=1e-15)
     assert str(tracks[40].reason.value) == "fewer than four points that span space"
 
 
-@pytest.mark.parametrize(("eps_px", "is_solved"), [(0.5, False), (30.0, True)])
+@pytest.mark.parametrize(("eps_px", "is_solved"), [(0.5, False), (4.0, False), (30.0, True)])
 def test_nothing_farther_than_eps_from_its_prediction_is_taken(eps_px, is_solved):
     scene, motion = scenes.Scene(), scenes.leaving(2, TIMES[:4])
     found = following.follow(scene, motion, 7, "published", labelled=False, eps_px=eps_px)

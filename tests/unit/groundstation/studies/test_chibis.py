@@ -1,6 +1,7 @@
 """The study of the Chibis-M, in small: what comes out, and what it hangs on."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,22 @@ def test_wrong_settings_lose_the_target_or_do_not(simulated, words, published, d
     for side, is_followed in ((PUBLISHED, published), (DEFAULT, default)):
         share = right_share(simulated, run_case(simulated, case, side), side)
         assert (share > 0.9) if is_followed else (share < 0.1)
+
+
+@pytest.mark.parametrize(
+    ("solved", "gap", "last"),
+    [
+        ("111000", 3, 2),
+        ("1110001", 3, 2),
+        ("1101001", 3, 6),
+        ("0001", 3, None),
+        ("0011", 3, 3),
+        ("", 2, None),
+    ],
+)
+def test_the_work_ends_before_a_gap(simulated, solved, gap, last):
+    course = replace(simulated.courses[PUBLISHED], is_solved=np.array([each == "1" for each in solved], bool))
+    assert course.last_solved(gap) == last
 
 
 @pytest.mark.slow
