@@ -4,12 +4,13 @@ import functools
 import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from groundstation.core.sources import INTERFACE, LIBRARY, built_folder, sources_sha256
+
+if TYPE_CHECKING:  # a completed command line loads this, and nothing heavy
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class CoreError(RuntimeError):
@@ -30,7 +31,7 @@ class Core:
     lib: Any
     ffi: Any
 
-    def doubles(self, array: NDArray[np.float64] | None) -> Any:  # noqa: ANN401 - a pointer of cffi's
+    def doubles(self, array: "NDArray[np.float64] | None") -> Any:  # noqa: ANN401 - a pointer of cffi's
         """The numbers of an array as a function of the core takes them: whole in memory, row by row."""
         return self.ffi.NULL if array is None else self.ffi.from_buffer("double[]", array)
 

@@ -123,7 +123,7 @@ def parse_elements(text: str) -> list[TwoLineElements]:
     Raises:
         ValueError: A line is not as it should be; the message names line and reason.
     """
-    rows = [(number, line.rstrip()) for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
+    rows = [(number, line.rstrip()) for number, line in enumerate(text.splitlines(), 1)]
     rows = [(number, line) for number, line in rows if line]
     found: list[TwoLineElements] = []
     name = ""

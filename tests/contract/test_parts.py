@@ -273,8 +273,8 @@ def test_a_vehicles_own_controller_stands_before_that_of_its_type():
     given = with_control("vehicles.alpha", controller="go_to")
     given["mock_ups"]["standard"]["control"] = {"controller": "station"}
     rig = build_rig(given, RIG)
-    assert rig.tables.nodes["controller"].make(rig, "alpha")._name == "go_to"
-    assert rig.tables.nodes["controller"].make(rig, "beta")._name == "station"
+    assert rig.tables.nodes["controller"].make(rig, "alpha")._chosen.name == "go_to"
+    assert rig.tables.nodes["controller"].make(rig, "beta")._chosen.name == "station"
 
 
 # -- actions --------------------------------------------------------------------------------------
