@@ -51,6 +51,18 @@ class TableConfig(Settings):
         return self
 
 
+class SunLampConfig(Settings):
+    """The lamp that stands for the Sun: it lights what side cameras look at."""
+
+    azimuth_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 60.0
+    """Direction towards the lamp in the table, counter-clockwise from +x."""
+    elevation_deg: Annotated[float, Field(ge=0.0, le=80.0)] = 15.0
+    level_dn: Annotated[float, Field(ge=0.0, le=2000.0)] = 200.0
+    """Grey level of a white surface that faces the lamp; 0: it is off."""
+    ambient_ratio: Fraction = 0.0
+    """What comes from everywhere else, as a share of that."""
+
+
 class LaboratoryConfig(Settings):
     """The `[laboratory]` table, beside the sections of devices (`device_table.read_config`)."""
 
@@ -60,6 +72,7 @@ class LaboratoryConfig(Settings):
     """Where relative paths start: the rig file's folder, filled in by who reads the rig; else the current."""
     seed: Annotated[int, Field(ge=0)] = 0
     table: TableConfig = TableConfig()
+    sun_lamp: SunLampConfig = SunLampConfig()
     vehicles: Annotated[tuple[VehicleConfig, ...], Field(min_length=1, max_length=MAX_VEHICLES)]
     failures: Annotated[
         tuple[FailureConfig, ...], Field(validation_alias=AliasChoices("failures", "faults"))

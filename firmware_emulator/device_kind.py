@@ -114,7 +114,9 @@ class DeviceKind(Generic[SettingsT]):
         name: The channel is `<vehicle>/<name>`, or `<name>` where all vehicles share the device.
         channel: What travels on it.
         per_vehicle: Builds the device of a mock-up from its section's settings; None if it has none.
-        per_laboratory: The same for one that all share. A kind has one builder or the other.
+        per_laboratory: The same for one that all share.
+        among_others: The same for one that a mock-up carries and that looks at the others. A kind has one of
+            the three builders.
         section: Its table in `[[laboratory.vehicles]]`, or in `[laboratory]` if it is shared; empty if its
             keys stand in that table itself, which its builder then gets. Kinds may share a section.
         settings: The section's shape.
@@ -130,6 +132,7 @@ class DeviceKind(Generic[SettingsT]):
     channel: ChannelKind
     per_vehicle: Callable[[MockUp, SettingsT], Device | None] | None = None
     per_laboratory: Callable[[Site, SettingsT], Device | None] | None = None
+    among_others: Callable[[Site, MockUp, SettingsT], Device | None] | None = None
     section: str = ""
     settings: type[SettingsT] | None = None
     is_standard: bool = False
@@ -141,8 +144,11 @@ class DeviceKind(Generic[SettingsT]):
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise ValueError(f"device kind {self.name!r}: a name is lower case, as it is part of a channel's")
-        if (self.per_vehicle is None) == (self.per_laboratory is None):
-            raise ValueError(f"device kind {self.name!r} needs one builder, per_vehicle or per_laboratory")
+        builders = (self.per_vehicle, self.per_laboratory, self.among_others)
+        if sum(builder is not None for builder in builders) != 1:
+            raise ValueError(
+                f"device kind {self.name!r} needs one builder: per_vehicle, per_laboratory or among_others"
+            )
         if bool(self.section) != (self.settings is not None):
             raise ValueError(f"device kind {self.name!r} has a section without settings or the reverse")
         if bool(self.served_by) == (self.pictures is not None):
@@ -162,8 +168,11 @@ class DeviceKind(Generic[SettingsT]):
         """The device of a mock-up, or of the site if it is shared; None if there is none in this scenario."""
         if self.per_laboratory is not None:
             return self.per_laboratory(site, settings)
-        if self.per_vehicle is None or mock_up is None:
+        if mock_up is None:
             raise ValueError(f"a device of kind {self.name!r} needs a mock-up to carry it")
+        if self.among_others is not None:
+            return self.among_others(site, mock_up, settings)
+        assert self.per_vehicle is not None
         return self.per_vehicle(mock_up, settings)
 
     def order(self, scenario: Scenario, index: int = 0) -> PictureOrder | None:

@@ -20,6 +20,7 @@ from firmware_emulator.devices.drawn_fixes import FIXES
 from firmware_emulator.devices.failure_channel import LABORATORY
 from firmware_emulator.devices.imu import IMU
 from firmware_emulator.devices.overhead_camera import OVERHEAD_CAMERA
+from firmware_emulator.devices.side_camera import SIDE_CAMERA
 from firmware_emulator.devices.star_camera import STAR_CAMERA
 from firmware_emulator.devices.truth_stream import REFERENCE
 from firmware_emulator.devices.valve_bus import VALVE_BUS
@@ -35,6 +36,7 @@ OWN: tuple[DeviceKind[Any], ...] = (
     REFERENCE,
     FIXES,
     STAR_CAMERA,
+    SIDE_CAMERA,
     OVERHEAD_CAMERA,
 )
 

@@ -45,14 +45,15 @@ def _own_parts() -> tuple[Part, ...]:
     from groundstation.parts.outside.part import PART as OUTSIDE
     from groundstation.parts.overhead.part import PART as OVERHEAD
     from groundstation.parts.reference.part import PART as REFERENCE
+    from groundstation.parts.relative_navigation.part import PART as RELATIVE_NAVIGATION
     from groundstation.parts.scenario.part import PART as SCENARIO
     from groundstation.parts.stars.part import PART as STARS
     from groundstation.parts.supervision.part import PART as SUPERVISION
     from groundstation.parts.valves.part import PART as VALVES
 
     return (
-        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, CONTROL, OPERATION, OUTSIDE, SCENARIO,
-        LABORATORY, REFERENCE,
+        SUPERVISION, VALVES, IMU, STARS, OVERHEAD, FUSION, RELATIVE_NAVIGATION, CONTROL, OPERATION, OUTSIDE,
+        SCENARIO, LABORATORY, REFERENCE,
     )  # fmt: skip
 
 

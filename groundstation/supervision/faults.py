@@ -228,7 +228,7 @@ FAULTS: Mapping[str, Fault] = {
               "room left against the rate of writing", 2.0,
               ((0.0, _NOTE),), _ITSELF, True, True, "Free space on the disk."),
         Fault("leader_old", "What another vehicle of its formation publishes is old.",
-              "no state of it for 1 s; the distance widens before, then the place is held", 1.5,
+              "no state or sighting of it for 1 s; the distance widens before, then the place is held", 1.5,
               ((0.0, _NOTE), (4.0, _HOLD)), _ITSELF, False, False,
               "See what is wrong with the other vehicle."),
     )

@@ -84,9 +84,21 @@ def _silences(seen: Sightings, now_ns: int, *, is_grounded: bool) -> Iterator[tu
         room_s = seen.recorder_room_s
         yield "disk_low", f"room for {room_s:.0f} s" if room_s else "it is full: nothing is recorded"
     for name in seen.leaders:
+        if name == seen.seen_leader:
+            yield from _unseen_leader(seen, now_ns)
+            continue
         other = seen.others.get(name)
         if other is not None and seen.is_silent(other.arrival_ns, OTHER_S, now_ns):
             yield "leader_old", f"{name}: {_age('state', other.arrival_ns, now_ns)}"
+
+
+def _unseen_leader(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:
+    """A side camera's sightings count from when the vehicle knows its own place: before, none can be used."""
+    if seen.placed_ns is None:
+        return
+    newest_ns = max(seen.placed_ns, seen.leader_seen_ns or 0)
+    if seen.is_silent(newest_ns, OTHER_S, now_ns):
+        yield "leader_old", f"{seen.seen_leader} is not seen: {_age('sighting', newest_ns, now_ns)}"
 
 
 def _station(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:

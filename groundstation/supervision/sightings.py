@@ -65,6 +65,8 @@ class Sightings:
         placed_ns: Since when the estimator places it without a break; None while it does not.
         others: Those of the other vehicles.
         leaders: Names of vehicles whose states its controller wants.
+        seen_leader: The one of them that the side camera tells of instead; empty where there is none.
+        leader_seen_ns: When it was last seen; None before the first time.
         name: Of this vehicle.
         dockings: Pairs of the rig that may touch, each inside its corridor.
         node: The newest status of its valve node; None before the first.
@@ -93,6 +95,8 @@ class Sightings:
     placed_ns: int | None = None
     others: dict[str, Seen] = field(default_factory=dict)
     leaders: tuple[str, ...] = ()
+    seen_leader: str = ""
+    leader_seen_ns: int | None = None
     name: str = ""
     dockings: tuple[Docking, ...] = ()
     node: NodeSeen | None = None

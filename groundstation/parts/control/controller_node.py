@@ -21,6 +21,7 @@ from groundstation.parts.control.actions import CHANGE_CONTROLLER, GO_TO
 from groundstation.parts.control.laws import Law, Maker
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
+from groundstation.parts.relative_navigation.messages import LeaderState, leader_control_state
 from groundstation.parts.supervision.messages import Supervision
 from groundstation.parts.valves.messages import ValveCommand, ValveDemand
 from groundstation.supervision.apart import Others
@@ -47,9 +48,11 @@ class ControllerNode(Node):
         make: Makes the laws that it is changed to; None where it keeps its own.
         obstacles: What stands on the table: goals in it are refused.
         waits: The program begins with the request ``resume``.
+        sees: The neighbour that laws know by what the own side camera sees of it, instead of by the other's
+            own estimate; empty for none.
     """
 
-    inputs = (
+    inputs: tuple[type[Message], ...] = (
         VehicleState,
         ControlStatus,
         FusionStatus,
@@ -75,8 +78,12 @@ class ControllerNode(Node):
         *,
         obstacles: tuple[Obstacle, ...] = (),
         waits: bool = False,
+        sees: str = "",
     ) -> None:
         super().__init__(vehicle, round(period_s * 1e9))
+        self._sees = sees
+        if sees:
+            self.inputs = (*self.inputs, LeaderState)
         self._chosen = law
         self._law: Controller = law.program
         if waits and law.holding is not None:
@@ -114,6 +121,9 @@ class ControllerNode(Node):
         match message:
             case VehicleState():
                 self._receive_state(message)
+            case LeaderState():
+                if message.seen == self._sees and message.seen in self._followed:
+                    self._states[message.seen] = (message.stamp_ns, leader_control_state(message))
             case ControlStatus():
                 self._others.goals_table_m[message.vehicle] = message.goal_position_table_m
                 self._led_by[message.vehicle] = message.led_by
@@ -169,6 +179,8 @@ class ControllerNode(Node):
             self._others.positions_table_m[message.vehicle] = message.position_table_m
         if message.status != "flying" or message.vehicle not in self._followed:
             return
+        if message.vehicle == self._sees:
+            return  # the side camera tells where it is
         state = control_state(message)
         self._states[message.vehicle] = (message.stamp_ns, state)
         if message.vehicle == self.vehicle:

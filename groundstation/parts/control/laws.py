@@ -4,13 +4,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from groundstation.control.controller import Controller
 from groundstation.control.controllers import ControllerRow, controllers, make_controller
+from groundstation.control.follow import FollowConfig
 from groundstation.declarations.rig import Rig
 from groundstation.declarations.validation import message_of
 from groundstation.parts.control.sections import ControlSection, config_of, control_of, dockings_of
+from groundstation.parts.relative_navigation.sections import RelativeNavigationOfVehicle
 
 HOLDING = "go_to"
 """The controller that flies where a program is interrupted."""
@@ -70,6 +72,7 @@ def law_of(rig: Rig, vehicle: str, section: ControlSection, key: str) -> Law:
             raise ValueError(
                 f"{key}.parameters: {neighbour!r} is no other vehicle of the rig (there are: {others})"
             )
+    _check_heading(rig, vehicle, config, neighbours)
     model, keep_in = rig.type_of(vehicle).model(), rig.table.keep_in()
     try:
         program = row.make(config, model, keep_in)
@@ -77,6 +80,23 @@ def law_of(rig: Rig, vehicle: str, section: ControlSection, key: str) -> Law:
         raise ValueError(f"{key}.parameters: {error}") from error
     holding = make_controller(HOLDING, {}, model, keep_in) if row.has_program else None
     return Law(section.controller, program, holding, neighbours, tuple(row.led_by(config)))
+
+
+def _check_heading(rig: Rig, vehicle: str, config: BaseModel, neighbours: tuple[str, ...]) -> None:
+    """Of a neighbour that is seen by its lit part no law may want to know how it is turned.
+
+    Raises:
+        ValueError: The law does, or nobody knows whether it does.
+    """
+    keys = rig.vehicle(vehicle, RelativeNavigationOfVehicle)
+    seen = keys.leader_seen()
+    if seen not in neighbours or keys.side_camera is None or keys.side_camera.by != "lit_part":
+        return
+    if not isinstance(config, FollowConfig) or config.bearing == "leader":
+        raise ValueError(
+            f"vehicles.{vehicle}.leader_by: the lit part of {seen} does not tell how it is turned, which "
+            "this controller needs: find it by its markers"
+        )
 
 
 def maker_of(rig: Rig, vehicle: str) -> Maker:

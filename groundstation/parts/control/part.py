@@ -14,6 +14,7 @@ from groundstation.parts.control.gauges import GAUGES, StationFigure
 from groundstation.parts.control.laws import Law, check_name, law_of, maker_of, row_of
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.control.sections import ControlOfType, ControlOfVehicle, control_of
+from groundstation.parts.relative_navigation.sections import RelativeNavigationOfVehicle
 
 
 def _process(rig: Rig, vehicle: str) -> str:
@@ -48,6 +49,7 @@ def controller_node(rig: Rig, vehicle: str, law: Controller | None = None) -> Co
         maker_of(rig, vehicle) if given is None else None,
         obstacles=rig.table.obstacles(),
         waits=section.waits,
+        sees=rig.vehicle(vehicle, RelativeNavigationOfVehicle).leader_seen(),
     )
 
 
@@ -56,7 +58,13 @@ def _check(rig: Rig) -> None:
         assert isinstance(type_, ControlOfType)
         check_name(type_.control.controller, f"mock_ups.{name}.control")
     for name in rig.vehicles:
-        law_of(rig, name, *control_of(rig, name))
+        law = law_of(rig, name, *control_of(rig, name))
+        seen = rig.vehicle(name, RelativeNavigationOfVehicle).leader_seen()
+        if seen and seen not in law.neighbours:
+            raise ValueError(
+                f"vehicles.{name}.leader_by: its side camera looks for {seen}, whom its controller does not "
+                "follow"
+            )
     check_leaders(rig)
     check_holds(rig)
     check_corridors(rig)

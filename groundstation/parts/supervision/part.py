@@ -11,6 +11,7 @@ from groundstation.fusion.noise import lag_of_bandwidth
 from groundstation.parts.control.sections import dockings_of, neighbours_of
 from groundstation.parts.fusion.sections import FusionOfType, fused_sources
 from groundstation.parts.imu.sections import ImuOfType
+from groundstation.parts.relative_navigation.sections import RelativeNavigationOfVehicle
 from groundstation.parts.stars.sections import StarsOfType, StarsOfVehicle
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.fault_detector import FaultDetector
@@ -55,6 +56,7 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
         began_ns=0,
         most_frames_hz=2.0 * NODE_FRAMES_HZ * len(rig.vehicles) + SPARE_FRAMES_HZ,
         leaders=neighbours_of(rig, vehicle),
+        seen_leader=rig.vehicle(vehicle, RelativeNavigationOfVehicle).leader_seen(),
         name=vehicle,
         dockings=dockings_of(rig),
     )

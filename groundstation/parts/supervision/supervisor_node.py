@@ -13,6 +13,7 @@ from groundstation.declarations.request import Ack, ArgumentError, Request, answ
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
+from groundstation.parts.relative_navigation.messages import LeaderState
 from groundstation.parts.supervision.actions import ACTIONS
 from groundstation.parts.supervision.memory import memory_of
 from groundstation.parts.supervision.messages import (
@@ -61,6 +62,8 @@ class SupervisorNode(Node):
         absent: Mapping[str, str],
     ) -> None:
         super().__init__(vehicle, PERIOD_NS)
+        if supervisor.sightings.seen_leader:
+            self.inputs = (*self.inputs, LeaderState)
         self._model = model
         self._supervisor = supervisor
         self._others = others
@@ -115,6 +118,8 @@ class SupervisorNode(Node):
                     sightings.others[message.vehicle] = seen
                 else:
                     sightings.see_own(seen)
+            case LeaderState():
+                sightings.leader_seen_ns = now_ns
             case FusionStatus():
                 sightings.rest_s, sightings.fix_age_s = message.rest_s, message.fix_age_s
                 self._count_fixes(message)
