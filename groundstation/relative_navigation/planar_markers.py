@@ -151,7 +151,8 @@ class _Search:
         off[~faces] = np.inf
         explained = (off.min(axis=1) < 2.0 * GATE_PX).sum(axis=1)
         order = np.argsort(-explained, kind="stable")[: 8 * CANDIDATES]
-        return order[explained[order] >= FEWEST]
+        found: Ints = order[explained[order] >= FEWEST]
+        return found
 
     def _predicted(self, poses: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Pixels of all markers for poses (n, 3): (n, m, 2), and which of them face the camera (n, m)."""
@@ -172,7 +173,8 @@ class _Search:
         pixels, faces = self._predicted(pose[None])
         off = np.linalg.norm(pixels[0][:, None] - self._centres.pixels[None], axis=2)
         off[~faces[0]] = np.inf
-        markers, spots = [], []
+        markers: list[int] = []
+        spots: list[int] = []
         while len(markers) < min(off.shape):
             marker, spot = np.unravel_index(int(np.argmin(off)), off.shape)
             if not off[marker, spot] < gate_px:
@@ -201,7 +203,8 @@ class _Search:
         if len(markers) < FEWEST:
             return None
         residuals, slopes = self._equations(pose, markers, spots)
-        return _Fit(pose, np.linalg.inv(slopes.T @ slopes), float(residuals @ residuals), len(markers))
+        covariance: Floats = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
+        return _Fit(pose, covariance, float(residuals @ residuals), len(markers))
 
     def _equations(self, pose: Floats, markers: Ints, spots: Ints) -> tuple[Floats, Floats]:
         """Whitened residuals (2 m,) and their derivatives by x, y, heading (2 m, 3)."""

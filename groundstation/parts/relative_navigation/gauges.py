@@ -83,7 +83,7 @@ class SightingFigure(Figure):
             self._reasons[message.reason] = self._reasons.get(message.reason, 0) + 1
             return
         self._ranges_m.append(message.range_m)
-        self._misfits.append(message.misfit)
+        self._misfits.append(message.misfit_ratio)
         self._with_heading += not math.isnan(message.relative_heading_rad)
 
     def values(self) -> dict[str, Any]:

@@ -44,7 +44,7 @@ class RelativePose(Message):
             heading cannot be seen.
         stamp_sigma_s: Of the stamp.
         points: Markers used, or columns of the lit part.
-        misfit: Mean square of the residuals over their sigmas.
+        misfit_ratio: Mean square of the residuals over their sigmas.
         reason: Empty, or why it is not seen.
     """
 
@@ -59,7 +59,7 @@ class RelativePose(Message):
     covariance: Float64x9
     stamp_sigma_s: F64
     points: U16
-    misfit: F64
+    misfit_ratio: F64
     reason: Text
 
 

@@ -45,7 +45,7 @@ class SupervisorNode(Node):
         absent: Those of them that no node answers here, and why; it refuses these, too.
     """
 
-    inputs = (
+    inputs: tuple[type[Message], ...] = (
         StopPress, Request, Lease, Recalled, VehicleState, FusionStatus, ValveStatus, ValveShares, Wrench,
         ControlStatus, Findings, RecorderStatus, Diagnostics, OutsideControl,
     )  # fmt: skip
