@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
+from firmware_emulator.side_view.scene import read_hulls, read_side_camera
 from firmware_emulator.sky.scene import read_camera
 from groundstation.data_sets.known_block import read_known
 from groundstation.files.errors import FileError
@@ -15,6 +16,8 @@ from groundstation.fusion.constants_file import read_constants
 from groundstation.fusion.table_map import MapProvenance, TableMap
 from groundstation.overhead.liveries import load_liveries
 from groundstation.overhead.overhead_camera import OverheadCamera
+from groundstation.relative_navigation.side_bodies import load_side_bodies
+from groundstation.relative_navigation.side_camera import SideCamera
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.stamp_delay import read_delay
 from tests.contract.test_tables_of_people import KNOWN
@@ -39,6 +42,8 @@ FILES = {
     "camera.json": (lambda _: (RIG / "camera.json").read_text(), CameraCalibration.load),
     "overhead_camera.json": (lambda _: (RIG / "overhead_camera.json").read_text(), OverheadCamera.load),
     "circles.toml": (lambda _: (RIG / "circles.toml").read_text(), load_liveries),
+    "side_camera.json": (lambda _: (RIG / "side_camera.json").read_text(), SideCamera.load),
+    "side_bodies.toml": (lambda _: (RIG / "side_bodies.toml").read_text(), load_side_bodies),
     "delay.toml": (lambda _: DELAY, read_delay),
     "constants.toml": (lambda _: CONSTANTS, lambda path: read_constants([path])),
     "map.toml": (_map_text, TableMap.load),
@@ -47,6 +52,10 @@ FILES = {
     "overhead camera of the emulator": (
         lambda _: (RIG / "overhead_camera.json").read_text(), read_overhead_camera,
     ),
+    "side camera of the emulator": (
+        lambda _: (RIG / "side_camera.json").read_text(), read_side_camera,
+    ),
+    "hulls of the emulator": (lambda _: (RIG / "side_bodies.toml").read_text(), read_hulls),
     "circles of the emulator": (lambda _: (RIG / "circles.toml").read_text(), read_markings),
 }  # fmt: skip
 NUMBER = re.compile(r"(?<=[=:\[,] )-?\d+(?:\.\d+)?(?:e-?\d+)?(?=[,\]}\n ])|(?<=\[)-?\d+\.\d+(?=[,\]])")

@@ -124,6 +124,17 @@ class TestSilence:
         known.others = {"beta": seen(19 * S - 1)}
         assert found(known) == {"leader_old": "beta: the newest state is 1.0 s old"}
 
+    def test_a_leader_that_is_seen_counts_by_its_sightings(self, known, seen):
+        known.leaders, known.seen_leader = ("beta",), "beta"
+        known.others = {"beta": seen(0)}
+        assert found(known) == {}  # the vehicle does not know its own place
+        known.placed_ns = 19 * S
+        assert found(known) == {}
+        known.placed_ns = 10 * S
+        assert found(known) == {"leader_old": "beta is not seen: the newest sighting is 10.0 s old"}
+        known.leader_seen_ns = 19 * S
+        assert found(known) == {}
+
     def test_others_count_for_a_second(self, known, seen):
         known.others = {"beta": seen(19 * S), "gamma": seen(19 * S - 1)}
         assert set(known.others_here(20 * S)) == {"beta"}
