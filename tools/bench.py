@@ -44,6 +44,7 @@ from bench import (  # noqa: E402
     published,
     recorder,
     report,
+    side_camera,
     station_keeping,
     stop,
 )
@@ -105,6 +106,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "relative": relative_accuracy.measure,
         "relative_images": relative_images.measure,
         "relative_peers": relative_peers.measure,
+        "side_camera": side_camera.measure,
         "fresh_clone": fresh_clone.measure,
     }
 )

@@ -24,7 +24,7 @@ FEWEST = 3
 """Markers of a pose: two always fit some pair of a dozen."""
 MOST_SPOTS = 40
 """More are no body with markers; the work grows with their square."""
-CENTRE_FLOOR_PX = 0.016
+CENTRE_FLOOR_PX = 0.012
 """What the model of a disk leaves of the picture of a round sticker on a curved hull."""
 HIGHER_M = 0.03
 """A marker nearer to the camera's own height says nothing of the depth by itself."""
@@ -93,6 +93,7 @@ class _Search:
         spread = centres.covariances + CENTRE_FLOOR_PX**2 * np.eye(2)
         self._whiten = np.linalg.inv(np.linalg.cholesky(spread))
         azimuth = np.array(body.azimuths_rad)
+        self._body = body
         self._normals = np.column_stack((np.cos(azimuth), np.sin(azimuth)))
 
     def fits(self) -> list[_Fit]:
@@ -218,6 +219,7 @@ class _Search:
         depth, across = from_eye @ ahead, from_eye @ right
         above = self._eye[2] - points[:, 2]
         pixels = np.column_stack((across, above)) * (lens.f_px / depth)[:, None] + (lens.cx_px, lens.cy_px)
+        pixels += self._askew(pose[2], markers, depth, across, above)
         moves = np.zeros((len(points), 2, 3))  # of the point by x, y, heading
         moves[:, 0, 0] = moves[:, 1, 1] = 1.0
         moves[:, 0, 2], moves[:, 1, 2] = -arm[:, 1], arm[:, 0]
@@ -230,6 +232,31 @@ class _Search:
         residuals = np.einsum("nij,nj->ni", whiten, pixels - self._centres.pixels[spots])
         slopes = np.einsum("nij,njk->nik", whiten, np.stack((du, dv), axis=1))
         return residuals.ravel(), slopes.reshape(-1, 3)
+
+    def _askew(
+        self, heading_rad: float, markers: Ints, depth: Floats, across: Floats, above: Floats
+    ) -> Floats:
+        """How far the light of each marker lies from the image of its middle, px (m, 2).
+
+        Along the tangent, which runs c across and q into the depth, with s from the middle, an element is
+        seen at u(s) = f (X + s c) / (Z + s q). Its image is as large as Z^-3, so the nearer half weighs
+        more, times the cosine between the line of sight P and the hull, whose normal n turns by s / R. To
+        second order its light is as that of the point s = r^2 (t.P / (4 R n.P) - q / Z), since the mean of
+        s^2 over a disk is r^2 / 4.
+        """
+        normals = self._normals[markers]
+        cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+        turned = np.column_stack((
+            cosine * normals[:, 0] - sine * normals[:, 1], sine * normals[:, 0] + cosine * normals[:, 1]
+        ))  # fmt: skip
+        tangents = np.column_stack((-turned[:, 1], turned[:, 0]))
+        c, q = tangents @ self._right, tangents @ self._ahead
+        facing = across * (turned @ self._right) + depth * (turned @ self._ahead)
+        facing = np.minimum(facing, -GRAZING * np.hypot(across, depth))
+        radius_m, wide_m = self._body.radius_m, self._body.marker_radius_m
+        s = wide_m**2 * ((across * c + depth * q) / (4.0 * radius_m * facing) - q / depth)
+        scale = s * self._camera.lens.f_px / depth
+        return np.column_stack((scale * (c - q * across / depth), -scale * q * above / depth))
 
 
 def _is_near(one: Floats, other: Floats) -> bool:

@@ -25,9 +25,9 @@ FEWEST_MARKERS = 3
 MOST_MARKERS = 64
 LEAST_APART_M = 0.02
 """Between two markers: nearer ones melt into one spot."""
-INWARD_RATIO = 0.375
-"""The light of a round sticker on a curved side is centred nearer to the axis than the sticker's middle, by
-this times the square of its radius over the hull's: the mean of R sin(a + s) weighted by cos(a + s)."""
+INWARD_RATIO = 0.125
+"""By this times the square of its radius over the hull's, a round sticker's light is nearer to the axis than
+the surface: the mean of 1 - cos s over a disk."""
 _MOST_M = 10.0
 
 

@@ -1,6 +1,7 @@
 """A mock-up found by its markers: accuracy, truth of the covariance, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from groundstation.relative_navigation.sighting import Seen, Unseen
 from .side_scenes import BODIES, CAMERA, Errors, Scene, pose_at
 
 ALPHA = BODIES["alpha"]
+POINTS = replace(ALPHA, marker_radius_m=1e-6)
+"""The same with points of light, which have no nearer half."""
 
 
 def look():
@@ -52,21 +55,21 @@ def test_places_and_turns_are_as_drawn_and_the_covariance_is_true(range_m, rng):
         pose = pose_at(range_m, rng.uniform(-0.12, 0.12), rng.uniform(-math.pi, math.pi))
         errors.add(eye(scene.picture(alpha=pose)), pose)
     assert not errors.unseen
-    assert errors.rms("range_m") < 0.001 * (range_m / 1.5) ** 2 + 0.0002
+    assert errors.rms("range_m") < 0.0002 + 0.0005 * (range_m / 1.5) ** 2
     assert errors.rms("bearing_rad") < math.radians(0.1)
     assert errors.rms("heading_rad") < math.radians(0.3)
-    assert 0.1 < np.mean(errors.nes) < 2.0
+    assert 0.3 < np.mean(errors.nes) < 2.0
 
 
 def test_exact_pixels_give_the_exact_pose_and_noise_its_own_covariance(rng):
     pose = pose_at(1.5, 0.05, 0.7)
-    exact = find_by_markers(CAMERA, ALPHA, centres(spots_of(pose)))
+    exact = find_by_markers(CAMERA, POINTS, centres(spots_of(pose, POINTS)))
     assert isinstance(exact, Seen)
     assert (*exact.position_body_m, exact.heading_rad) == pytest.approx(pose, abs=1e-7)
     nes = []
     for _ in range(200):
-        pixels = spots_of(pose)
-        seen = find_by_markers(CAMERA, ALPHA, centres(pixels + rng.normal(0.0, 0.2, pixels.shape), 0.2))
+        pixels = spots_of(pose, POINTS)
+        seen = find_by_markers(CAMERA, POINTS, centres(pixels + rng.normal(0.0, 0.2, pixels.shape), 0.2))
         assert isinstance(seen, Seen)
         off = np.array([*seen.position_body_m, seen.heading_rad]) - pose
         nes.append(off @ np.linalg.solve(seen.covariance, off))
@@ -77,8 +80,8 @@ def test_exact_pixels_give_the_exact_pose_and_noise_its_own_covariance(rng):
 
 def test_false_lights_are_left_out(rng):
     pose = pose_at(1.2, -0.05, 2.0)
-    pixels = np.vstack([spots_of(pose), rng.uniform((20, 20), (620, 460), (12, 2))])
-    seen = find_by_markers(CAMERA, ALPHA, centres(rng.permutation(pixels)))
+    pixels = np.vstack([spots_of(pose, POINTS), rng.uniform((20, 20), (620, 460), (12, 2))])
+    seen = find_by_markers(CAMERA, POINTS, centres(rng.permutation(pixels)))
     assert isinstance(seen, Seen)
     assert (*seen.position_body_m, seen.heading_rad) == pytest.approx(pose, abs=1e-3)
 
