@@ -90,11 +90,8 @@ def _of_pictures(by: str, name: str, frames: int) -> Iterator[Row]:
 
 
 def _accuracy(what: str, by: str, off: Floats) -> Iterator[Row]:
-    range_mm, bearing_deg, heading_deg = np.sqrt(np.mean(np.square(off), axis=0)) * (
-        1e3,
-        180 / math.pi,
-        180 / math.pi,
-    )
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    range_mm, bearing_deg, heading_deg = 1e3 * rms[0], math.degrees(rms[1]), math.degrees(rms[2])
     limit_mm, limit_deg = LIMITS[by]
     yield Row(f"{what}: distance RMS", f"{limit_mm:g} mm", f"{range_mm:.2f} mm", bool(range_mm <= limit_mm))
     yield Row(
@@ -140,6 +137,8 @@ def _of_flight(by: str, path: Path) -> Iterator[Row]:
     what = f"side camera, {WORDS[by]}, live at 1.5 m"
     share = len(off) / len(poses)
     yield Row(f"{what}: pictures that show it", "95 %", f"{100 * share:.1f} % of {len(poses)}", share >= 0.95)
+    if not off:
+        return
     yield from _accuracy(what, by, np.array(off))
     own, other = truth["beta"], truth["alpha"]
     rows = own[own[:, 0] >= from_ns]
