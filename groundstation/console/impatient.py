@@ -1,4 +1,4 @@
-"""A connection that asks for nothing is not kept: a thousand of them keep nobody from the stop."""
+"""A connection that asks for nothing is closed after ten seconds."""
 
 import asyncio
 

@@ -78,7 +78,7 @@ class ReplaySource:
                 "path": str(recording.path),
                 "start_s": recording.start_ns * 1e-9,
                 "duration_s": (recording.stop_ns - recording.start_ns) * 1e-9,
-                "other": "" if other is None else str(other.path),
+                "other": "" if other is None else other.path.name,
             },
         }
         self._seek(self._first_ns)

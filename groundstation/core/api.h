@@ -145,9 +145,9 @@ typedef struct {
 } Span;
 
 /* A member's state: rotation (3, 3) camera from body, position, velocity, rate, acceleration. */
-enum { MEMBER = 21, MEMBER_ERRORS = 15 };
+enum { MEMBER = 21, MEMBER_ERRORS = 15, MOST_MEMBERS = 16 };
 
-/* Carry members (m, MEMBER) and their covariances (m, 15, 15) over a span, in place. `densities` (m, 3) of what is
+/* Carry members (m, MEMBER) and their covariances (m, 15, 15) over a span, in place; at most MOST_MEMBERS. `densities` (m, 3) of what is
  * unmodelled: turning, along the line of sight, across it. */
 void gs_bank_predict(const Span *span, int64_t m, double *states, double *covariance, const double *densities);
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { S = MEMBER_ERRORS, P6 = 6, POSITION = 9, VELOCITY = 12, RATE = 15, ACCELERATION = 18, MOST_MEMBERS = 16 };
+enum { S = MEMBER_ERRORS, P6 = 6, POSITION = 9, VELOCITY = 12, RATE = 15, ACCELERATION = 18 };
 /* Places of a state behind its rotation; those of its errors: */
 enum { E_POSITION = 0, E_TURN = 3, E_VELOCITY = 6, E_RATE = 9, E_ACCELERATION = 12 };
 

@@ -51,10 +51,23 @@ class MotionBank:
     Attributes:
         states: (m, 21).
         covariances: (m, 15, 15).
+
+    Raises:
+        ValueError: Their shapes are others, or the members too many.
     """
 
     states: Floats
     covariances: Floats
+
+    def __post_init__(self) -> None:
+        lib = default_core().lib
+        count = len(self.states)
+        wanted = ((count, lib.MEMBER), (count, lib.MEMBER_ERRORS, lib.MEMBER_ERRORS))
+        if (self.states.shape, self.covariances.shape) != wanted or not 0 < count <= lib.MOST_MEMBERS:
+            raise ValueError(
+                f"members are at most {lib.MOST_MEMBERS}, of {lib.MEMBER} numbers and {lib.MEMBER_ERRORS} "
+                f"errors, found {self.states.shape} and {self.covariances.shape}"
+            )
 
     @classmethod
     def at(cls, count: int, pose: Pose, covariance: Floats) -> MotionBank:
@@ -93,20 +106,24 @@ class MotionBank:
                 along the line of sight and across it (m^2/s^5).
         """
         core = default_core()
-        span = core.ffi.new("Span *")
-        numbers = np.frombuffer(core.ffi.buffer(span), dtype=np.float64, count=90)
         n, dt = craft.orbital_rate_rad_s, end_s - begin_s
-        numbers[0:9] = craft.camera_from_orbital(begin_s).ravel()
-        numbers[9:18] = craft.camera_from_orbital(end_s).ravel()
-        numbers[18:27] = craft.turned_by(begin_s, end_s).ravel()
-        numbers[27:63] = hill_transition(n, dt).ravel()
-        numbers[63:81] = hill_response(n, dt).ravel()
-        numbers[81:84] = craft.camera_from_mass_m
-        numbers[84:86] = dt, n
-        if inertia_kg_m2 is not None:
-            numbers[86:89] = inertia_kg_m2
-        numbers[89] = STEP_RAD
-        span.has_inertia, span.most_steps = inertia_kg_m2 is not None, MOST_STEPS
+        span = core.ffi.new(
+            "Span *",
+            {
+                "begin": craft.camera_from_orbital(begin_s).ravel().tolist(),
+                "end": craft.camera_from_orbital(end_s).ravel().tolist(),
+                "swing": craft.turned_by(begin_s, end_s).ravel().tolist(),
+                "carry": hill_transition(n, dt).ravel().tolist(),
+                "push": hill_response(n, dt).ravel().tolist(),
+                "camera_m": craft.camera_from_mass_m.tolist(),
+                "dt_s": dt,
+                "orbital_rate": n,
+                "inertia": [0.0, 0.0, 0.0] if inertia_kg_m2 is None else inertia_kg_m2.tolist(),
+                "has_inertia": inertia_kg_m2 is not None,
+                "step_rad": STEP_RAD,
+                "most_steps": MOST_STEPS,
+            },
+        )
         given = np.ascontiguousarray(densities, dtype=np.float64)
         core.lib.gs_bank_predict(
             span,

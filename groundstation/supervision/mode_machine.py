@@ -231,6 +231,8 @@ def _refusal(event: Event, memory: Memory) -> str:
     if memory.mode in BRAKEABLE and event is Event.RESUME:
         return f"it is about to land: {memory.cause}"
     hint = _HINTS.get(event) if not memory.is_stop_latched else "wait until it is down"
+    if event is Event.FLY and memory.mode is Mode.ARMED:
+        hint = "float_on lets it fly, once it is armed"
     return f"{event} does not count while it is {memory.mode}" + (f": {hint}" if hint else "")
 
 

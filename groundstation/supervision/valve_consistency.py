@@ -18,6 +18,8 @@ from groundstation.supervision.valve_inquiry import SURE, ValveInquiry, Verdict
 from groundstation.supervision.valve_trial import Kind
 
 PUSHED_HOLDS_NS = 2_000_000_000
+_LATE_COMMAND_BLOCKS = 10
+"""So many are not judged after a moment at which a command was late on its way to the node."""
 _DOUBTED = 3.0
 """A block is not learned from while a fault is that likely; a weak valve is what learning is to find out."""
 _UNEXPLAINED_CHANCE = (0.01, 0.9)
@@ -27,8 +29,6 @@ _OF_LARGEST = 0.3
 _HARD_PUSH = 1.7
 _CALM_BLOCKS = 10
 _LONGEST_PUSH_BLOCKS = 50
-_DOUBTED_BLOCKS = 10
-"""So many are not judged after a moment at which commands may have reached the node late."""
 """After a shock valves are not accused while forces go on, but not for longer than this."""
 _IS_CONSTANT = 0.95
 
@@ -110,7 +110,7 @@ class ValveConsistency:
         self._begin()
 
     def _begin(self) -> None:
-        self._calm_after = self._pushed_blocks = self._doubted_blocks = 0
+        self._calm_after = self._pushed_blocks = self._blocks_to_skip = 0
         self._unexplained = 0.0
         self._inquiry.forget()
         self._odd_blocks, self._odd_x, self._odd_y, self._odd_square = 0, 0.0, 0.0, 0.0
@@ -161,9 +161,9 @@ class ValveConsistency:
         self._take(block, stamp_ns)
         return before != (self._valve_findings, self._shifted, self._pushed)
 
-    def doubt(self) -> None:
+    def skip_late_command(self) -> None:
         """Judge nothing for a fifth of a second: what was commanded may have been carried out late."""
-        self._doubted_blocks = _DOUBTED_BLOCKS
+        self._blocks_to_skip = _LATE_COMMAND_BLOCKS
 
     def findings(self, now_ns: int) -> tuple[Finding, ...]:
         """What was found: valves and sensors until `reset`, pushes for two seconds."""
@@ -174,8 +174,8 @@ class ValveConsistency:
 
     def _take(self, block: Block, stamp_ns: int) -> None:
         misfit = self._fit.compare(block)
-        if self._doubted_blocks:
-            self._doubted_blocks -= 1
+        if self._blocks_to_skip:
+            self._blocks_to_skip -= 1
             self._fit.lose_rate()
             return
         x, y = misfit.force_m_s2

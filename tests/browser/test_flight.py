@@ -212,6 +212,31 @@ def test_a_note_reaches_the_list_of_events(page):
     page.get_by_text("lamp switched off").wait_for()
 
 
+def test_a_vehicle_is_landed_armed_and_flown_again(page, api):
+    take_control(page)
+    card = page.get_by_role("region", name="beta", exact=True)
+    card.get_by_role("button", name="Land", exact=True).click()
+    beta = "document.querySelector('[aria-label=beta] .words').textContent"
+    page.wait_for_function(f"() => {beta}.startsWith('landed')", timeout=30 * S)
+    arm = card.get_by_role("button", name="Arm", exact=True)
+    for _ in range(100):  # it is refused, with the reason, until the rest has lasted
+        arm.click()
+        page.wait_for_timeout(200)
+        if api(page)["vehicles"]["beta"]["valves"]["armed"]:
+            break
+    assert api(page)["vehicles"]["beta"]["valves"]["armed"]
+    assert not api(page)["vehicles"]["beta"]["valves"]["floating"]
+    card.get_by_role("button", name="Fly", exact=True).click()
+    page.wait_for_function(
+        "() => document.getElementById('notice').textContent.includes('float_on lets it fly')"
+    )
+    card.get_by_role("button", name="Disarm", exact=True).click()
+    page.wait_for_function(f"() => {beta}.startsWith('landed')", timeout=30 * S)
+    card.get_by_role("button", name="Fly", exact=True).click()
+    page.wait_for_function(f"() => {beta}.startsWith('flying')", timeout=FLYING_MS)
+    give_control(page)
+
+
 @pytest.mark.parametrize("size", ["phone", "tablet", "laptop"])
 def test_stop_is_within_reach_on_every_screen(opened, flight, size):
     page = opened(flight.address, size)

@@ -49,7 +49,7 @@ export class Operation {
       el("header", {}, el("h2", {style: `color:${colour(index)}`}, name), el("span", {class: "small", "data-part": "age"})), words, facts);
     if (this.may) card.append(el("div", {class: "buttons"}, ...buttons), goal);
     card.append(more);
-    this.cards[name] = {card, words, facts, buttons, inputs: inputs.map((label) => label.querySelector("input")), age: card.querySelector("[data-part=age]"), cells: {}};
+    this.cards[name] = {card, words, facts, inputs: inputs.map((label) => label.querySelector("input")), age: card.querySelector("[data-part=age]"), cells: {}};
     return card;
   }
 
@@ -69,7 +69,7 @@ export class Operation {
     show();
     const change = el("button", {"data-action": "change_controller"}, "Change controller");
     const form = el("form", {class: "small", onsubmit: (event) => { event.preventDefault(); this.change(name, choice.value, text.value); }}, choice, summary, text, change);
-    const rigs = el("p", {class: "small"}, `The rig has ${about.controller}. A goal interrupts a program until Resume; so does a change.`);
+    const rigs = el("p", {class: "small"}, `The rig has ${about.controller}. A goal interrupts a program until Resume; a changed controller begins its program with Resume.`);
     return this.may ? el("div", {}, rigs, form) : rigs;
   }
 

@@ -27,7 +27,7 @@ STARTED_AGAIN = "the player was started again, and a timeline is not carried out
 
 
 class Player(Node):
-    """Waits until all vehicles fly, or for a person; then publishes what the timeline asks at its moments.
+    """Waits until all fly and, if started by hand, for a person; then publishes what the timeline asks.
 
     Args:
         section: The timeline.
@@ -127,8 +127,10 @@ class Player(Node):
         refusal = self._lease.objection(request, now_ns)
         if refusal:
             return refusal
+        if not self._section.by_hand:
+            return "the scenario is not started by hand: it begins when all are ready"
         if self._state != WAITING or self._is_asked_for:
-            return f"the scenario is not started by hand, or has been started: it is {self._state}"
+            return f"the scenario has been started: it is {self._state}"
         missing = self._not_ready(now_ns)
         self._is_asked_for = not missing
         return missing

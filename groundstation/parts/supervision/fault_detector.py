@@ -92,7 +92,7 @@ class FaultDetector(Node):
                     self._valves.command(message.stamp_ns, message.pulse_id, message.on_time_ms)
             case ValveStatus():
                 if self._lag.is_late(message.stamp_ns, message.counter):
-                    self._valves.doubt()
+                    self._valves.skip_late_command()
                 if (
                     message.armed
                     and not message.dead_man

@@ -175,6 +175,12 @@ def is_the_same(bank, motions, covariances):
     assert bank.covariances == pytest.approx(covariances, rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.parametrize(("count", "numbers"), [(0, 21), (17, 21), (7, 20)])
+def test_members_that_the_core_has_no_room_for_are_refused(count, numbers):
+    with pytest.raises(ValueError, match="at most 16"):
+        MotionBank(np.zeros((count, numbers)), np.zeros((count, 15, 15)))
+
+
 @pytest.mark.parametrize("inertia", [scenes.INERTIA, None])
 @pytest.mark.parametrize("orbital_rate", [0.0, RATE])
 @pytest.mark.parametrize("span_s", [0.033, 3.0])

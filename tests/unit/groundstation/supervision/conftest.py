@@ -163,7 +163,7 @@ def fly(detector, rng, truth, chosen, *, noise=DEFAULT, period_ms=4, order=None)
             detector.command(period * PERIOD_MS * 1_000_000, (period + 1) % 16, rows[period])
         since_ms = end_ms - period * PERIOD_MS
         if truth.late_ms is not None and 10 < since_ms <= truth.late_ms[period] and end_ms % 20 == 0:
-            detector.doubt()  # a status, each 20 ms, names the command before
+            detector.skip_late_command()  # a status, each 20 ms, names the command before
         stamp_ns = end_ms * 1_000_000
         if detector.sample(stamp_ns, window_s, rates[sample], tuple(forces[sample])):
             yield end_ms * 1e-3, detector.findings(stamp_ns)
