@@ -70,6 +70,7 @@ class ControllerRow(Generic[ConfigT]):
         led_by: Those of them without whom it has no place of its own, by its parameters.
         docks_with: Whom it may touch and in which corridor, by its parameters; None where nobody.
         has_program: It knows by itself where to go; a goal interrupts it until it is resumed.
+        is_planned_together: It plans for all ships before they fly, so that none changes to it in flight.
         is_built_in: It is of the tree; others run in a process of their own.
     """
 
@@ -82,12 +83,8 @@ class ControllerRow(Generic[ConfigT]):
     of_rig: Callable[[str, Mapping[str, Vector2], Obstacles], Mapping[str, Any]] = _nothing
     docks_with: Callable[[ConfigT], tuple[str, Corridor] | None] = _with_nobody
     has_program: bool = False
+    is_planned_together: bool = False
     is_built_in: bool = False
-
-    @property
-    def is_planned_together(self) -> bool:
-        """Its parameters depend on what all ships of the rig do when they begin."""
-        return self.of_rig is not _nothing
 
     def build(
         self, parameters: Mapping[str, Any], vehicle: VehicleModel, keep_in: KeepIn | None
@@ -155,6 +152,7 @@ _BUILT_IN: Mapping[str, ControllerRow[Any]] = MappingProxyType(
                 "obstacles_m": obstacles_m,
             },
             has_program=True,
+            is_planned_together=True,
         ),
         "dock": ControllerRow(
             "come in along the corridor of another mock-up's port to a soft contact",

@@ -1,14 +1,13 @@
 """Controller: vehicle state in, wrench out, at the rate of the pulse modulation."""
 
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller, KeepsPlaces
 from groundstation.control.keep_in import KeepIn
+from groundstation.control.leading import lost_followers
 from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
 from groundstation.control.surroundings import Obstacle
 from groundstation.declarations.lease import Lease, LeaseCheck
@@ -18,7 +17,7 @@ from groundstation.declarations.request import Ack, ArgumentError, Request, answ
 from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.parts.control.actions import CHANGE_CONTROLLER, GO_TO
-from groundstation.parts.control.laws import Law, Maker
+from groundstation.parts.control.laws import Law, Maker, parameters_of
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.relative_navigation.messages import LeaderState, leader_control_state
@@ -214,30 +213,17 @@ class ControllerNode(Node):
             given = CHANGE_CONTROLLER.read(request)
             if self._make is None:
                 return "its law was given to it by a program, and stays"
-            law = self._make(str(given["controller"]), _parameters(str(given["parameters"])))
+            law = self._make(str(given["controller"]), parameters_of(str(given["parameters"])))
         except ValueError as error:  # an ArgumentError is one
             return str(error)
-        leader = self._would_follow_itself(law)
-        if leader:
-            return f"{leader} follows {self.vehicle} itself: nobody would lead"
+        led_by = {name: self._led_by.get(name, ()) for name in self._vehicles}
+        if self.vehicle in lost_followers({**led_by, self.vehicle: law.led_by}):
+            return f"{', '.join(law.led_by)} would be led by {self.vehicle} itself: nobody would lead"
         self._goal = self._law.setpoint(self._goal)
         self._chosen = law
         self._followed = frozenset((self.vehicle, *law.neighbours))
         self._states = {name: row for name, row in self._states.items() if name in self._followed}
         self._take_over(law.holding or law.program)
-        return ""
-
-    def _would_follow_itself(self, law: Law) -> str:
-        """Which of the law's leaders follows this vehicle, over however many others; empty for none."""
-        for leader in law.led_by:
-            seen, waiting = set[str](), [leader]
-            while waiting:
-                name = waiting.pop()
-                if name == self.vehicle:
-                    return leader
-                if name not in seen:
-                    seen.add(name)
-                    waiting += self._led_by.get(name, ())
         return ""
 
     def _take_over(self, law: Controller) -> None:
@@ -260,18 +246,3 @@ class ControllerNode(Node):
             self._chosen.neighbours,
             self._chosen.led_by,
         )
-
-
-def _parameters(text: str) -> dict[str, Any]:
-    """Parameters of a controller.
-
-    Raises:
-        ValueError: They are no JSON object.
-    """
-    try:
-        given = json.loads(text)
-    except (ValueError, RecursionError):
-        given = None
-    if not isinstance(given, dict):
-        raise ValueError(f"{CHANGE_CONTROLLER.name}: the parameters are no JSON object")
-    return given

@@ -4,6 +4,7 @@ import itertools
 import math
 
 from groundstation.control.controllers import controllers
+from groundstation.control.leading import lost_followers
 from groundstation.control.state import ControlState
 from groundstation.declarations.rig import Rig
 from groundstation.parts.control.sections import config_of, control_of, dockings_of, neighbours_of
@@ -20,10 +21,7 @@ def check_leaders(rig: Rig) -> None:
         name: controllers()[control_of(rig, name)[0].controller].led_by(config_of(rig, name))
         for name in rig.vehicles
     }
-    led = {name for name, leaders in led_by.items() if not leaders}
-    while more := {name for name, leaders in led_by.items() if name not in led and led & set(leaders)}:
-        led |= more
-    lost = [name for name in led_by if name not in led]
+    lost = lost_followers(led_by)
     if not lost:
         return
     circle = [lost[0]]

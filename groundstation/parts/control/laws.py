@@ -1,5 +1,6 @@
 """The control law of a vehicle: the one that its rig names, and those that it is changed to while it runs."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -142,3 +143,18 @@ def _first(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         return f"{where}: is no parameter of this controller (a typo?)"
     return f"{where}: {message_of(first)}, found {first['input']!r:.60}"
+
+
+def parameters_of(text: str) -> dict[str, Any]:
+    """Parameters of a controller.
+
+    Raises:
+        ValueError: They are no JSON object.
+    """
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise ValueError("change_controller: the parameters are no JSON object")
+    return given

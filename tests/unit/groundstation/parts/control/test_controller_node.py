@@ -180,7 +180,7 @@ def test_nobody_follows_who_follows_it_over_however_many(flown):
     beta = ControlStatus(0, "beta", "follow", (0.0, 0.0), 0.0, 0.0, 0.0, ("gamma",), ("gamma",))
     take(flown, gamma, beta)
     reason = change(flown, "follow", leader="beta", distance_m=0.8)
-    assert reason == "beta follows alpha itself: nobody would lead"
+    assert reason == "beta would be led by alpha itself: nobody would lead"
     assert published(flown).controller == "go_to"
 
 
