@@ -83,7 +83,8 @@ def request(
     """Ask something of a running vehicle, or of all, and print the answer.
 
     A stop has a path of its own, and is repeated until every vehicle has taken it. All vehicles can be
-    asked to stop, land, release, fly, disarm or float_off.
+    asked to stop, land, release, fly, disarm or float_off. take_control, give_control and start_scenario
+    concern the rig: name any vehicle, or all.
 
     Exit code 0 if it was accepted, 1 if it was refused or nobody answered.
 

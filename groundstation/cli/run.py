@@ -52,7 +52,10 @@ def run(
         typer.Option(help="Recording to write (.mcap). Default: a folder of this run in recordings/."),
     ] = None,
     lockstep: Annotated[
-        bool, typer.Option("--lockstep", help="Virtual time, as fast as the CPU allows; needs --duration.")
+        bool,
+        typer.Option(
+            "--lockstep", help="Virtual time, as fast as the CPU allows; of a rig it needs --duration."
+        ),
     ] = False,
     seed: Annotated[
         int | None, typer.Option(help="Of the emulated laboratory; of a rig, in lockstep.", min=0)
