@@ -93,9 +93,16 @@ def _moment(text: str) -> datetime:
 def _minutes(text: str) -> tuple[float, float, float]:
     parts = text.split(":")
     if len(parts) != 3:
-        raise ValueError("expected FIRST:LAST:STEP")
-    first, last, step = (float(part) for part in parts)
+        raise ValueError("expected three numbers FIRST:LAST:STEP")
+    first, last, step = (_number(part) for part in parts)
     return first, last, step
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ValueError(f"expected three numbers FIRST:LAST:STEP, found {text!r}") from error
 
 
 def _row(state: RelativeState, start: datetime) -> tuple[str, ...]:
@@ -108,7 +115,7 @@ def _row(state: RelativeState, start: datetime) -> tuple[str, ...]:
         state.rate_rad_s,
         *(constants.c1, constants.c2, constants.c3, constants.c4, constants.c5, constants.c6),
     )
-    return (f"{state.when:%Y-%m-%dT%H:%M:%S.%f}Z", *(f"{x:.10g}" for x in numbers))
+    return (f"{state.when:%Y-%m-%dT%H:%M:%S.%f}Z", *(f"{x + 0.0:.10g}" for x in numbers))
 
 
 def _report(first: TwoLineElements, second: TwoLineElements, state: RelativeState) -> None:
@@ -120,11 +127,13 @@ def _report(first: TwoLineElements, second: TwoLineElements, state: RelativeStat
         )
         for note in each.notes:
             print(f"  {note}")
-    x, y, z = (1e-3 * state.position_m).tolist()
+    if first.number == second.number:
+        print(f"both sets are of object {first.number}")
+    x, y, z = (1e-3 * state.position_m + 0.0).tolist()
     constants = state.constants
     print(f"{state.when:%Y-%m-%dT%H:%M:%SZ}: up {x:.3f} km, along-track {y:.3f} km, normal {z:.3f} km")
     print(
-        f"C1 = {constants.c1:.4g} m: the ellipse wanders {constants.drift_m_rev:.4g} m a revolution; half "
-        f"axes {', '.join(f'{axis:.4g}' for axis in constants.semi_axes_m)} m (up, along-track, normal)"
+        f"C1 = {constants.c1:.4g} m: the ellipse wanders {constants.drift_m_rev + 0.0:.4g} m a revolution; "
+        f"half axes {', '.join(f'{axis:.4g}' for axis in constants.semi_axes_m)} m (up, along-track, normal)"
     )
     print(ACCURACY)

@@ -72,11 +72,20 @@ def _print_study(study: Study) -> None:
         print(f"  {row.label}: {row.title}")
 
 
+def _labels(study: Study) -> str:
+    """What it draws, in numbers: ``figures 2, 3; tables 1, 2``."""
+    numbers: dict[str, list[str]] = {}
+    for row in study.figures:
+        numbers.setdefault(row.kind, []).extend(map(str, row.numbers))
+    return "; ".join(
+        f"{kind}{'s' if len(known) > 1 else ''} {', '.join(known)}" for kind, known in numbers.items()
+    )
+
+
 def _rows(study: Study, figure: str | None) -> list[FigureRow]:
     if figure is None:
         return list(study.figures)
     rows = [row for row in study.figures if figure in map(str, row.numbers)]
     if not rows:
-        known = ", ".join(str(number) for row in study.figures for number in row.numbers)
-        raise UsageError(f"{study.name} has no figure {figure} to draw: it draws {known}.")
+        raise UsageError(f"{study.name} has no figure {figure} to draw: it draws {_labels(study)}.")
     return rows

@@ -1,6 +1,6 @@
-"""How bodies turn between frames: Euler's equations, with gravity gradient where the orbit is known.
+"""How bodies turn between frames: Euler's equations without torque; with gravity gradient: `motion_bank`.
 
-``J w' + w x J w = 3 n^2 e x J e``: w the absolute rate, e the direction away from the Earth, in body axes.
+``J w' + w x J w = 0``: w the absolute rate, in body axes.
 Many bodies at once, as a filter's members are; the turn is a Magnus series of fourth order over short steps.
 The core does it.
 """

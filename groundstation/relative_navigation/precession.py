@@ -87,16 +87,28 @@ def precession_of(rate_body_rad_s: Floats, inertia: AxialInertia) -> Precession:
 
 
 def precess(start: Floats, rate_body_rad_s: Floats, inertia: AxialInertia, times_s: Floats) -> Floats:
-    """Return rotations (n, 3, 3) at times (n,) from one (3, 3) at time 0, inertial from body.
+    """Return rotations at times (n,) from that at time 0, inertial from body.
 
     ``R(t) = exp([K] t / In) R0 exp([x] (1 - Ix/In) wx t)`` with ``K = R0 diag(Ix, In, In) w``.
+
+    Args:
+        start: Of one motion (3, 3), or of many (g, 3, 3).
+        rate_body_rad_s: Of each at time 0, (3,) or (g, 3).
+        inertia: Of the body.
+        times_s: (n,).
+
+    Returns:
+        (n, 3, 3) of one motion, (g, n, 3, 3) of many.
     """
     moments = np.array((inertia.along_kg_m2, inertia.across_kg_m2, inertia.across_kg_m2))
-    about = start @ (moments * rate_body_rad_s) / inertia.across_kg_m2
-    spin = (1.0 - inertia.along_kg_m2 / inertia.across_kg_m2) * float(rate_body_rad_s[0])
-    own = np.zeros((len(times_s), 3))
-    own[:, 0] = spin * times_s
-    found: Floats = turns(times_s[:, None] * about) @ start @ turns(own)
+    about = (start @ (moments * rate_body_rad_s)[..., None])[..., 0] / inertia.across_kg_m2
+    spin = (1.0 - inertia.along_kg_m2 / inertia.across_kg_m2) * rate_body_rad_s[..., 0]
+    shape = (*rate_body_rad_s.shape[:-1], len(times_s), 3)
+    own = np.zeros(shape)
+    own[..., 0] = spin[..., None] * times_s
+    swung = times_s[:, None] * about[..., None, :]
+    first, last = (turns(each.reshape(-1, 3)).reshape(*shape, 3) for each in (swung, own))
+    found: Floats = first @ start[..., None, :, :] @ last
     return found
 
 

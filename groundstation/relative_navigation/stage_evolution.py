@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.relative_navigation.evolution import EvolutionSettings, evolve
+from groundstation.relative_navigation.precession import precess
 from groundstation.relative_navigation.rotations import turn, turns
 from groundstation.relative_navigation.stage_spin import Stage, StageRun
 
@@ -64,7 +65,7 @@ def search_stage(
     depths = stage.camera.start_m + stage.camera.speed_m_s * run.times_s
 
     def cost(members: Floats) -> Floats:
-        turned = precessed(turns(members[:, :3]) @ around, members[:, 3:], stage, instants)
+        turned = precess(turns(members[:, :3]) @ around, members[:, 3:], stage.inertia, instants)
         points = np.einsum("gnij,nj->gni", turned[:, which], stage.markers_m[run.marker])
         depth = depths - points[:, :, 0]
         off = stage.camera.f_px * points[:, :, 1:] / depth[:, :, None] - run.pixels
@@ -75,17 +76,3 @@ def search_stage(
     found = evolve(cost, -half, half, settings, rng)
     rms = float(np.sqrt(found.cost / run.pixels.size))
     return StageSearch(found.parameters[3:], turn(found.parameters[:3]) @ around, rms, found.evaluations)
-
-
-def precessed(starts: Floats, rates_rad_s: Floats, stage: Stage, times_s: Floats) -> Floats:
-    """Return attitudes (g, n, 3, 3) of g members at n times: `precession.precess` for a whole generation."""
-    along, across = stage.inertia.along_kg_m2, stage.inertia.across_kg_m2
-    moments = np.array((along, across, across))
-    about = np.einsum("gij,gj->gi", starts, moments * rates_rad_s) / across
-    spin = (1.0 - along / across) * rates_rad_s[:, 0]
-    members, count = len(starts), len(times_s)
-    swung = turns((times_s[None, :, None] * about[:, None]).reshape(-1, 3)).reshape(members, count, 3, 3)
-    own = np.zeros((members, count, 3))
-    own[:, :, 0] = times_s * spin[:, None]
-    found: Floats = swung @ starts[:, None] @ turns(own.reshape(-1, 3)).reshape(members, count, 3, 3)
-    return found

@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 
 COLUMNS = 69
 ACCURACY = (
-    "Two-line elements place an object to about a kilometre at their epoch and one to three kilometres worse "
-    "each day: the difference is no better, and says nothing of a distance below some kilometres."
+    "As commonly stated, two-line elements place an object to about a kilometre at their epoch and some "
+    "kilometres worse each day: the difference is no better, and tells nothing of distances below that."
 )
 """What a result has to be read with."""
 EARTH_RADIUS_M = 6378135.0
@@ -62,6 +62,11 @@ class TwoLineElements:
     name: str
     lines: tuple[str, str]
     notes: tuple[str, ...] = ()
+
+    @property
+    def number(self) -> str:
+        """Of the catalogue, as the lines have it."""
+        return self.lines[0][2:7].strip()
 
     @property
     def record(self) -> Satrec:
@@ -225,7 +230,8 @@ def moments(start: datetime, minutes: tuple[float, float, float]) -> list[dateti
     """Return moments from one on: first, last and step in minutes.
 
     Raises:
-        ValueError: The step is not above zero, the last lies before the first, or they are too many.
+        ValueError: The step is not above zero, the last lies before the first, they are too many, or lie
+            beyond the calendar.
     """
     first, last, step = minutes
     if not (all(map(math.isfinite, minutes)) and step > 0.0 and last >= first):
@@ -233,4 +239,7 @@ def moments(start: datetime, minutes: tuple[float, float, float]) -> list[dateti
     count = math.floor((last - first) / step + 1e-9) + 1
     if count > 1_000_000:
         raise ValueError(f"minutes ask for {count} moments, at most 1000000 are taken")
-    return [start + timedelta(minutes=first + step * k) for k in range(count)]
+    try:
+        return [start + timedelta(minutes=first + step * k) for k in range(count)]
+    except OverflowError as error:
+        raise ValueError("minutes reach beyond the calendar") from error

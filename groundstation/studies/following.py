@@ -63,6 +63,14 @@ class Course:
         found: Floats = np.degrees(np.linalg.norm(self.off_rad, axis=1))
         return found
 
+    @property
+    def turned_deg(self) -> Floats:
+        """Rotation vector of the turn, camera axes, (n, 3); NaN where nothing is known."""
+        found = np.full((len(self.times_s), 3), np.nan)
+        known = np.isfinite(self.positions_m[:, 0])
+        found[known] = np.degrees(rotation_vectors(self.camera_from_body[known]))
+        return found
+
     def last_solved(self, gap: int) -> int | None:
         """Number of the last solved frame before so many unsolved ones in a row; None: not even the first."""
         unsolved = 0

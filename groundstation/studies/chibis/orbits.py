@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from drivers.laboratory.separations import SeparationOrder, fly_separation
 from groundstation.relative_navigation.hill import HillConstants, hill_constants, hill_transition
-from groundstation.studies.chibis.condition import INERTIA_KG_M2, RATE_RAD_S, SEMI_MAJOR_AXIS_M, TIPS_M
+from groundstation.studies.chibis.condition import INERTIA_KG_M2, RATE_RAD_S, TIPS_M
+from groundstation.studies.earth import circular_radius_m
 from groundstation.studies.plots import Plan
 from groundstation.studies.study import Drawn, Number
 
@@ -22,7 +23,7 @@ RADIAL_M = 1.0
 REVOLUTIONS = 3.0
 ASSUMED = (
     "the unit of C1, m; an ellipse of 1 m by 2 m; the circular orbit of the published mean motion",
-    "ours: the closed form of Hill's equations; beside it both craft integrated about a point mass",
+    "both craft integrated about a point mass, beside the closed form of Hill's equations",
 )
 
 
@@ -45,14 +46,15 @@ class RelativeOrbit:
 
 def relative_orbit(c1_m: float, revolutions: float = REVOLUTIONS) -> RelativeOrbit:
     """Return the orbit that begins on top of its ellipse."""
-    # C1 = 2 z0 + x0'/w with z0 = 2 C1 + C3 and C3 the half axis upwards
+    # published: C1 = 2 z0 + x0'/w with z0 = 2 C1 + C3 and C3 the half axis upwards;
+    # its z, x, y are x, y, z here
     up = 2.0 * c1_m + RADIAL_M
     place = np.array((up, 0.0, 0.0))
     pace = np.array((0.0, RATE_RAD_S * (c1_m - 2.0 * up), 0.0))
     times = np.linspace(0.0, revolutions * 2.0 * np.pi / RATE_RAD_S, 361)
     still = np.eye(3)
     # a circular orbit of this rate about a point mass, so that the two differ by what is linearised only
-    radius = SEMI_MAJOR_AXIS_M * _circle_share()
+    radius = circular_radius_m(RATE_RAD_S)
     order = SeparationOrder(
         times, radius, place, pace, INERTIA_KG_M2, still, np.zeros(3), still, 16.0, TIPS_M, size_px=(16, 16)
     )
@@ -65,15 +67,10 @@ def relative_orbit(c1_m: float, revolutions: float = REVOLUTIONS) -> RelativeOrb
     )
 
 
-def _circle_share() -> float:
-    """Radius of the circle with the published rate about a point mass, as a share of the mean axis."""
-    return float(np.cbrt(3.986004418e14 / RATE_RAD_S**2) / SEMI_MAJOR_AXIS_M)
-
-
 def draw_orbits(data: Mapping[str, Any]) -> Drawn:
     """Figures 2.1 and 2.2."""
     del data
-    pictures, numbers = [], []
+    pictures, numbers, largest_off_m = [], [], 0.0
     for c1 in (0.0, C1_M):
         found = relative_orbit(c1)
         words = f"C1 = {c1:g} m"
@@ -83,32 +80,30 @@ def draw_orbits(data: Mapping[str, Any]) -> Drawn:
         turn = len(found.times_s) // 3
         drift = found.integrated_m[turn, 1] - found.integrated_m[0, 1]
         up, along, _ = found.constants.semi_axes_m
+        off_m = float(np.linalg.norm(found.closed_m - found.integrated_m, axis=1).max())
+        largest_off_m = max(largest_off_m, off_m)
+        long_m = np.ptp(found.integrated_m[:turn, 1] - drift * np.arange(turn) / turn)
         numbers += [
             Number(
-                f"{words}: wanders along the track, m a revolution",
+                f"{words}: wanders along the track, closed form, m a revolution",
                 ours=found.constants.drift_m_rev + 0.0,
-                default=float(drift),
-                assumed="-6 pi C1; default: both craft integrated",
+                assumed="-6 pi C1",
             ),
+            Number(f"{words}: wanders along the track, integrated, m a revolution", ours=float(drift)),
+            Number(f"{words}: half axes along over up, closed form", ours=along / up),
             Number(
-                f"{words}: half axes along over up",
+                f"{words}: half axes along over up, integrated",
                 2.0,
-                along / up,
-                float(
-                    np.ptp(found.integrated_m[:turn, 1] - drift * np.arange(turn) / turn)
-                    / np.ptp(found.integrated_m[:turn, 0])
-                ),
+                float(long_m / np.ptp(found.integrated_m[:turn, 0])),
+                assumed="published by its formulas",
                 ratio=1.01,
             ),
-            Number(
-                f"{words}: closed form off the integrated way, largest, m",
-                ours=float(np.linalg.norm(found.closed_m - found.integrated_m, axis=1).max()),
-            ),
+            Number(f"{words}: closed form off the integrated way, largest, m", ours=off_m),
         ]
     sentences = (
-        "With C1 = 0 the ellipse, twice as long as high, closes; with 0.05 m it wanders by -6 pi C1, a "
-        "metre, in each revolution. At these distances what the linear equations leave out is a matter of "
-        "micrometres."
+        f"With C1 = 0 the ellipse, twice as long as high, closes; with C1 = {C1_M:g} m it wanders by -6 pi "
+        f"C1 = {-6.0 * np.pi * C1_M:.2f} m in each revolution. What the linear equations leave out is at "
+        f"most {1e6 * largest_off_m:.2g} micrometres here."
     )
     return Drawn(pictures, numbers, sentences)
 

@@ -1,4 +1,4 @@
-"""The published simulation, filmed, and followed by both sides."""
+"""A film like the published one, rendered by the emulator, and followed by both sides."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ WORDS = {PUBLISHED: "published methods", DEFAULT: "our defaults"}
 KINDS = {PUBLISHED: "v1", DEFAULT: "v0"}
 GAP = 10
 """So many unsolved frames in a row end the work, 40 s."""
-NEAR_M, FAR_M = (0.0, 3.5), (13.5, 15.0)
-"""Distances over which errors are taken together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -85,7 +85,7 @@ CHIBIS = Study(
     ),
     not_drawn={
         "Figures 1.1 to 1.5, 2.5, 3.1": "photographs and drawings of craft",
-        "Figures 2.3, 2.4, 3.2": "drawings of axes: docs/relative_navigation.md states them",
+        "Figures 2.3, 2.4, 3.2": "drawings of axes: docs/relative_navigation.md describes them",
         "Figure 2.9": "a sketch of one point between two frames; figure 3.5 shows the same with four",
     },
     about="Both sides were given the same pictures. t = 0 is the first frame.",

@@ -1,4 +1,4 @@
-"""The published film, rendered, and followed by both sides."""
+"""A film like the published one, rendered by the emulator, and followed by both sides."""
 
 from __future__ import annotations
 
@@ -57,6 +57,7 @@ ASSUMED = (
     "the published velocity in camera axes (right, down, forward); the published direction of the rate in "
     "body axes, made as fast as the gyro measured; its signs are doubtful",
     "the level of the binary picture 0.4; for both sides",
+    "inertia, orbit and place in it those of the simulation; the first guess 0.05 rad and 2 % off",
     "a gyro with 0.03 deg/s of noise, on the same motion 30 s later",
 )
 

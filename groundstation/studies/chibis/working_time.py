@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.laboratory.separations import SeparationOrder
+from groundstation.studies.chibis import condition
 from groundstation.studies.chibis.condition import F_PX, SIZE_PX, simulation
 from groundstation.studies.chibis.simulation import GAP, KINDS, SIDES, WORDS, simulate, tip_px
 from groundstation.studies.plots import Axes, Line, over_time
@@ -69,7 +70,7 @@ def orders(step_s: float, end_s: float) -> dict[str, list[tuple[float, Separatio
 
 def sweep_all(progress: Progress, step_s: float = STEP_S, names: Sequence[str] = ()) -> dict[str, Sweep]:
     """Run every sweep, or some."""
-    gap_s = GAP * 4.0
+    gap_s = GAP * condition.STEP_S
     wanted = {name: rows for name, rows in orders(step_s, END_S).items() if not names or name in names}
     count, done = sum(map(len, wanted.values())), 0
     found = {}
@@ -138,7 +139,7 @@ def draw_working_time(data: Mapping[str, Mapping[str, Sweep]]) -> Drawn:
             "smallest tip that is followed at all, mm",
             float("nan"),
             [critical_mm(tips, side) for side in SIDES],
-            "published: a critical size exists, without a value; a tip of 4 mm is one pixel at 3 m",
+            f"published: a critical size exists, without a value; one pixel at 3 m is {3e3 / F_PX:g} mm",
         ),
         Number.beside(
             "tip at the last solved frame, px, mean over sizes",
@@ -170,10 +171,10 @@ def draw_working_time(data: Mapping[str, Mapping[str, Sweep]]) -> Drawn:
     words = (
         "The work ends where a tip is smaller than a pixel, so its distance is the focal length times the "
         "tip's diameter, and there is a size below which it never begins. The distance is proportional to "
-        "the size, the time a little less; nothing in it is exponential. From 18 mm on the target leaves "
-        "the field of view before. The published methods may end at 808 s whatever the camera: the "
-        "microsatellite is then turned by half a turn, where the vector part of a quaternion is singular "
-        "and Newton's method does not come to rest."
+        "the size, the time a little less; nothing in it is exponential. The largest tips are still seen "
+        "when the target leaves the field of view. The published methods may end earlier, at one moment "
+        "whatever the camera: where the microsatellite is turned by half a turn, the vector part of a "
+        "quaternion is singular and Newton's method does not come to rest."
     )
     return Drawn(pictures, numbers, words)
 

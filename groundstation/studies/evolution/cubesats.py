@@ -51,6 +51,7 @@ ASSUMED = (
     f"differential evolution rand/1/bin with {EVOLUTION.population} members, F = {EVOLUTION.weight:g}, CR = "
     f"{EVOLUTION.crossover:g}, at most {EVOLUTION.generations} generations, the turn in a box of 0.6 rad "
     "about the prediction; the position by linear least squares",
+    "the first guess 0.05 rad and 2 % off",
 )
 
 
@@ -206,7 +207,8 @@ def draw_table(data: Mapping[str, Separated]) -> Drawn:
             ]
     words = (
         "The published psi has a mean of 0.080 and a largest error of 0.09 rad: that is a bias, nearly "
-        "constant, not noise. Errors of a search have no bias here, so the cause lies in what is not "
-        "published: the camera's model, the places of the markers, or the axes."
+        "constant, not noise. Errors of a search have no bias here, so the cause may lie in what is "
+        "not published: the camera's model, the places of the markers, or the axes; the data here cannot "
+        "tell."
     )
     return Drawn([], numbers, words)

@@ -10,7 +10,7 @@ from groundstation.data_sets.relative_case import case_of
 from groundstation.relative_navigation.motion_models import MOTION_MODELS
 from groundstation.relative_navigation.precession import AxialInertia, precess
 from groundstation.relative_navigation.solvers import SOLVERS
-from groundstation.relative_navigation.stage_evolution import precessed, search_stage
+from groundstation.relative_navigation.stage_evolution import search_stage
 from groundstation.relative_navigation.stage_spin import LeavingCamera, Stage, StageRun
 
 TIMES = np.arange(0.0, 240.0, 4.0)
@@ -84,7 +84,7 @@ def test_a_generation_precesses_as_each_of_its_members():
     rng = np.random.default_rng(1)
     starts = Rotation.from_rotvec(rng.normal(size=(4, 3))).as_matrix()
     rates, times = rng.normal(0.0, 0.1, (4, 3)), np.array([0.0, 0.7, 5.0])
-    found = precessed(starts, rates, STAGE, times)
+    found = precess(starts, rates, STAGE.inertia, times)
     for member in range(4):
         exact = precess(starts[member], rates[member], STAGE.inertia, times)
         np.testing.assert_allclose(found[member], exact, atol=1e-12)

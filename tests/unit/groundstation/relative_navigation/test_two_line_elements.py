@@ -202,14 +202,29 @@ def test_the_command_writes_a_row_per_moment_and_states_its_accuracy(groundstati
     assert row["utc"].startswith("2012-01-25T02:04:07.92")
 
 
+def test_one_object_given_twice_is_named_and_zero_has_no_sign(groundstation, files):
+    (files / "same.txt").write_text(text(PROGRESS, PROGRESS))
+    out = files / "relative.csv"
+    printed = groundstation("relative", "tle", files / "same.txt", "--out", out).stdout
+    assert "both sets are of object 00181" in printed
+    assert "wanders 0 m a revolution" in printed
+    assert "-0" not in printed.split("both sets")[1]
+    assert not any(value == "-0" for value in read(out)[0].values())
+
+
 @pytest.mark.parametrize(
     ("words", "error", "sentence"),
     [
         (("one.txt",), FileError, "holds 1 element sets, expected 2"),
         (("both.txt", "one.txt"), FileError, "holds 2 element sets, expected 1"),
         (("both.txt", "--at", "today"), UsageError, "--at must be a moment"),
-        (("both.txt", "--minutes", "0:1"), UsageError, "expected FIRST:LAST:STEP"),
-        (("both.txt", "--minutes", "0:1:x"), UsageError, "--minutes is '0:1:x'"),
+        (("both.txt", "--minutes", "0:1"), UsageError, "expected three numbers FIRST:LAST:STEP"),
+        (
+            ("both.txt", "--minutes", "0:1:x"),
+            UsageError,
+            "--minutes is '0:1:x': expected three numbers FIRST:LAST:STEP, found 'x'",
+        ),
+        (("both.txt", "--minutes", "1e12:1e12:1"), UsageError, "beyond the calendar"),
         (("both.txt", "--at", "2013-01-25T00:00:00"), UsageError, "days from the epoch"),
         (("nothing.txt",), FileError, "nothing.txt"),
     ],

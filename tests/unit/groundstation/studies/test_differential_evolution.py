@@ -8,11 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from groundstation.relative_navigation.error_table import PUBLISHED_STAGE
-from groundstation.studies.charts import histograms
 from groundstation.studies.evolution import cubesats
 from groundstation.studies.evolution.cubesats import draw_angles, separate
 from groundstation.studies.evolution.stage import MARKERS_M, exact_run, stage_runs
 from groundstation.studies.evolution.stage_figures import draw_histograms, draw_precession, draw_table
+from groundstation.studies.histograms import histograms
 from groundstation.studies.study import DEFAULT, PUBLISHED
 
 BOUND_DEG_S = np.array([0.11654, 0.26117, 0.26212])
@@ -45,9 +45,10 @@ def test_formulas_of_the_precession():
     numbers = by_name(draw_precession({}))
     assert numbers["half angle of the cone alpha, deg"].ours == pytest.approx(72.6373, abs=1e-4)
     assert numbers["momentum, kg m^2/s"].ours == pytest.approx(372.5542, abs=1e-4)
-    psi = numbers["rate of precession psi', deg/s"]
-    assert (psi.ours, psi.default) == (pytest.approx(-1.48173, abs=1e-5), pytest.approx(1.48173, abs=1e-5))
-    assert numbers["from the momentum to the axis, deg"].default == pytest.approx(107.3627, abs=1e-4)
+    printed = numbers["rate of precession psi' by the printed formula, deg/s"].ours
+    about = numbers["rate about the momentum vector, K/In, deg/s"].ours
+    assert (printed, about) == (pytest.approx(-1.48173, abs=1e-5), pytest.approx(1.48173, abs=1e-5))
+    assert numbers["from the momentum to the axis, deg"].ours == pytest.approx(107.3627, abs=1e-4)
 
 
 def test_both_searches_stand_at_the_bound(errors):
@@ -70,6 +71,7 @@ def test_the_table_has_the_published_formulas_beside_honest_ones(errors):
     )
     assert numbers["sample variance of wx, deg^2/s^2"].ours == pytest.approx(np.var(off, ddof=1))
     assert numbers["rms error of wy, deg/s"].published == pytest.approx(0.2416, abs=1e-4)
+    assert {number.comes_out for number in numbers.values()} == {None}, "the condition was chosen near them"
     found = by_name(draw_histograms({"stage": errors}))
     assert abs(found["mean error of wx, deg/s"].ours) < 3.0 * 0.1165 / math.sqrt(count)
     assert found["evolution and least squares apart, deg/s rms"].ours < 0.01

@@ -161,6 +161,10 @@ def test_studies_are_listed_and_what_is_not_there_is_named(groundstation, tmp_pa
         (("air-table",), "--out is needed"),
         (("air-table", "--out", tmp_path, "--figure", "12"), "has no figure 12"),
         (("chibis", "--out", tmp_path, "--figure", "2.3"), "has no figure 2.3"),
+        (
+            ("differential-evolution", "--out", tmp_path, "--figure", "9"),
+            "it draws figures 2, 3, 5, 6; tables 1, 2",
+        ),
         (("--figure", "8"), "name a study"),
     ):
         with pytest.raises(UsageError, match=sentence):
