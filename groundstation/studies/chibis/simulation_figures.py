@@ -157,7 +157,8 @@ def draw_errors(data: Mapping[str, Simulated]) -> Drawn:
     words = (
         "The error grows as the square of the distance and the more the fewer pixels a tip has, and no "
         "faster: nothing in it is exponential. Rates by differences of two poses carry their errors into "
-        "what is propagated after the tips are lost; a filter's rates hold far longer."
+        "what is propagated after the tips are lost; a filter's rates hold far longer. "
+        "One noise of the pictures: another gives errors that differ by a factor."
     )
     return Drawn(pictures, numbers, words)
 

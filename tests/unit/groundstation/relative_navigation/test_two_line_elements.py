@@ -208,7 +208,7 @@ def test_one_object_given_twice_is_named_and_zero_has_no_sign(groundstation, fil
     printed = groundstation("relative", "tle", files / "same.txt", "--out", out).stdout
     assert "both sets are of object 00181" in printed
     assert "wanders 0 m a revolution" in printed
-    assert "-0" not in printed.split("both sets")[1]
+    assert not any(zero in printed for zero in ("-0 ", "-0,", "-0.000"))
     assert not any(value == "-0" for value in read(out)[0].values())
 
 
