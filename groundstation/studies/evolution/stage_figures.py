@@ -131,7 +131,7 @@ def draw_table(data: Mapping[str, StageErrors]) -> Drawn:
     along, *across = (_statistics(found, axis)[PUBLISHED].rms for axis in range(3))
     words = (
         "By its own formulas the table looks far more accurate than a run is: D is divided by n (n - 1). A "
-        f"single run errs by {along:.2f} deg/s rms along the axis and by {across[0]:.2f} and {across[1]:.2f} "
+        f"single run errs by {along:.3f} deg/s rms along the axis and by {across[0]:.3f} and {across[1]:.3f} "
         "across it, at the bound of this geometry. Camera, markers and noise were chosen near the table, so "
         "its numbers have no verdict here. Two things need none: both transverse axes must be alike for a "
         "body of revolution, and the published z row is unlike y; a published sigma is not the root of its D."
