@@ -57,8 +57,8 @@ def draw_frames(data: Mapping[str, Filmed]) -> Drawn:
             side_by_side((plain, halves), "a frame, and the binary one"),
         ),
         (
-            "Figure 3.5: asterisks: the first guess; crosses: estimate by Newton's method. Right: at 3.1 s "
-            "the glare of the body hides the tips.",
+            "Figure 3.5: asterisks: the first guess; crosses: estimate by Newton's method. Right: at "
+            f"{GLARE_SHOWN_S:g} s the glare of the body hides the tips.",
             side_by_side((marked, blinded), "guess and estimate; glare"),
         ),
     ]

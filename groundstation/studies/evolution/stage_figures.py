@@ -134,6 +134,7 @@ def draw_table(data: Mapping[str, StageErrors]) -> Drawn:
         f"single run errs by {along:.3f} deg/s rms along the axis and by {across[0]:.3f} and {across[1]:.3f} "
         "across it, at the bound of this geometry. Camera, markers and noise were chosen near the table, so "
         "its numbers have no verdict here. Two things need none: both transverse axes must be alike for a "
-        "body of revolution, and the published z row is unlike y; a published sigma is not the root of its D."
+        "body of revolution, and the published z row is unlike y; the published sigmas of x and z are not "
+        "the roots of their D."
     )
     return Drawn([], numbers, words)
