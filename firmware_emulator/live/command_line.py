@@ -1,6 +1,7 @@
 """The command line of the live laboratory: read a rig, serve it, end cleanly."""
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,9 +31,19 @@ class _BadRig(Exception):  # noqa: N818 - the sentence is all that matters
     """The rig file cannot be used; the message gives the reason in one sentence."""
 
 
-def read_laboratory(path: Path) -> dict[str, object]:
-    """The `[laboratory]` table of a rig file, with `folder` set to where the file lies."""
-    rig = parse_toml(read_bytes(path), path)
+def read_laboratory(path: Path, descriptor: int | None = None) -> dict[str, object]:
+    """The `[laboratory]` table of a rig file, with `folder` set to where the file lies.
+
+    Args:
+        path: Of the rig.
+        descriptor: Open file that holds its text instead: a scenario changes the rig that it flies.
+    """
+    if descriptor is None:
+        data = read_bytes(path)
+    else:
+        with os.fdopen(descriptor, "rb") as content:
+            data = content.read()
+    rig = parse_toml(data, path)
     table = rig.get("laboratory")
     if not isinstance(table, Mapping):
         raise _BadRig(f"{path}: has no table [laboratory]")
@@ -59,14 +70,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m firmware_emulator", description=_DESCRIPTION)
     parser.add_argument("rig", type=Path, help="rig file (TOML) with a table [laboratory]")
     parser.add_argument("--seed", type=_seed, default=0, help="decides every random number (default 0)")
+    parser.add_argument(
+        "--text-from", type=int, help="open file (its number) that holds the rig's text instead"
+    )
     options = parser.parse_args(arguments)
     with _signals(_end):
         try:
-            laboratory = LiveLaboratory(read_laboratory(options.rig), options.seed)
+            laboratory = LiveLaboratory(read_laboratory(options.rig, options.text_from), options.seed)
         except ValidationError as error:
             return _refuse(f"{options.rig}: {sentence(error)}")
         except (_BadRig, FileError, NotFound) as error:
             return _refuse(str(error))
+        except OSError as error:
+            return _refuse(f"{options.rig}: its text cannot be read ({error.strerror}).")
         except _Ended:
             return 0
         try:

@@ -228,13 +228,19 @@ class Lines:
         return [line.decode(errors="replace").rstrip() for line in lines]
 
 
-def start_python(arguments: list[str]) -> Process:
-    """Start an interpreter of its own with these arguments; its stdin and both outputs are pipes."""
+def start_python(arguments: list[str], descriptors: tuple[int, ...] = ()) -> Process:
+    """Start an interpreter of its own with these arguments; its stdin and both outputs are pipes.
+
+    Args:
+        arguments: Of it.
+        descriptors: Open files that it inherits under their numbers.
+    """
     return subprocess.Popen(
         [sys.executable, *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,
+        pass_fds=descriptors,
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
     )

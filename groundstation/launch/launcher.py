@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterable
 from importlib.metadata import entry_points
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from drivers.laboratory import ENTRY_POINT_GROUP, Address, parse_announcement
 from groundstation.bus.zenoh_bus import ZenohBus, key_of
@@ -319,7 +320,12 @@ class Launcher:
         self._addresses = None
         if not laboratory.restarts:  # new mock-ups; one that is started again stands for the same ones
             self._memory.forget()
-        laboratory.adopt(start_python(["-m", self._package, str(self._rig_path)]), self._time.now_s)
+        with TemporaryFile() as content:  # a scenario has changed the rig: its file is not what flies
+            content.write(self._rig_text.encode())
+            content.seek(0)
+            number = content.fileno()
+            words = ["-m", self._package, str(self._rig_path), "--text-from", str(number)]
+            laboratory.adopt(start_python(words, (number,)), self._time.now_s)
 
     def close(self) -> None:
         """Valves first, then every child, then the hub; nothing is left behind after three seconds."""

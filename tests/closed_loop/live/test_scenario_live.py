@@ -7,6 +7,7 @@ import pytest
 
 from groundstation.cli.main import call
 from groundstation.declarations.request import Request
+from groundstation.parts.reference.messages import ReferenceState
 from groundstation.parts.scenario.messages import Marker, ScenarioStatus
 from groundstation.recording.reader import Recording
 
@@ -17,8 +18,11 @@ name = "live"
 rig = "{rig}"
 duration_s = 8.0
 
+[vehicles.alpha]
+start = {{ x_m = -0.5, y_m = 0.3, heading_deg = 20.0 }}
 [vehicles.beta]
 may_land = true
+laboratory = {{ mass_kg = 10.5 }}
 
 [[timeline]]
 at_s = 1.0
@@ -71,6 +75,12 @@ def test_a_scenario_that_holds_ends_with_0_by_itself_and_replays(launch, scenari
     with Recording(run.recording) as recording:
         (marker,) = [each.payload for each in recording.delivered([Marker])]
         states = [each.payload.state for each in recording.delivered([ScenarioStatus])]
+        truth = next(
+            each.payload for each in recording.delivered([ReferenceState]) if each.payload.vehicle == "alpha"
+        )
+    assert truth.position_table_m == pytest.approx(
+        (-0.5, 0.3), abs=0.01
+    )  # the scenario's start, not the rig's
     assert marker.text == "beta is down"
     assert states[-1] == "ended"
     assert call(["replay", str(run.recording)]) == 0, capsys.readouterr().out
