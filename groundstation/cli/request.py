@@ -182,7 +182,8 @@ def _values(row: Action, words: list[str]) -> dict[str, object]:
     if not any("=" in word for word in words):
         least = sum(argument.default is None for argument in row.arguments)
         if not least <= len(words) <= len(names):
-            wanted = " ".join(names) or "no arguments"
+            shown = (name if names[name].default is None else f"[{name}]" for name in names)
+            wanted = " ".join(shown) or "no arguments"
             raise ArgumentError(f"{row.name} takes {wanted}, found {len(words)} words")
         pairs = list(zip(names, words, strict=False))
     else:

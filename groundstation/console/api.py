@@ -1,13 +1,19 @@
 """``/api/``: what is shown, as JSON; requests, the stop, notes, goals flown ahead."""
 
+import asyncio
+
 from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, Response
+from starlette.requests import ClientDisconnect
 
 from groundstation.console.body import arguments_of, body_of, refused, text_of, token_of
 from groundstation.console.desk import NotAllowedError
 from groundstation.console.shown_console import Console
 from groundstation.console.wire import plain
 from groundstation.declarations.request import ArgumentError
+
+BODY_S = 0.5
+"""A stop waits for what is posted with it no longer."""
 
 
 def add_api(app: FastAPI, console: Console) -> None:
@@ -31,9 +37,10 @@ def add_api(app: FastAPI, console: Console) -> None:
         if console.desk is None:
             return refused(409, "this is a recording: there is nothing to stop")
         try:
-            body = await body_of(request)
-        except ValueError:
-            body = {}  # whatever was posted, it was a press
+            async with asyncio.timeout(BODY_S):
+                body = await body_of(request)
+        except (ValueError, TimeoutError, ClientDisconnect):
+            body = {}  # whatever was posted, or was to come, it was a press
         return JSONResponse(await console.press(console.desk, body))
 
     @app.post("/api/request")

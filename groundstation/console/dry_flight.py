@@ -78,7 +78,7 @@ def answer(question: Question) -> dict[str, Any]:
                     name.replace("_rad", "_deg"): math.degrees(value) if name.endswith("_rad") else value
                     for name, value in question.arguments.items()
                 },
-                "answer": "any",
+                "answer": "accepted",  # what is refused is said at once, and is no way
             }
         ],
     }
@@ -126,7 +126,8 @@ def main() -> None:
     try:
         found = answer(question)
     except (UsageError, GroundStationError, NodeError) as error:
-        found = {"refused": " ".join(str(error).split()), "paths": {}}
+        reason = " ".join(str(error).split()).removeprefix(f"{question.rig_path}: ")
+        found = {"refused": reason, "paths": {}}
     sys.stdout.write(json.dumps(plain(found)))
 
 

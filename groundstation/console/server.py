@@ -8,6 +8,7 @@ from importlib.resources import files
 from fastapi import FastAPI, Request
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from groundstation.console.access import COOKIE, Role
 from groundstation.console.api import add_api
@@ -89,6 +90,11 @@ def _add_pages(app: FastAPI) -> None:
         for entry in folder.iterdir()
         if entry.is_file() and entry.name.rpartition(".")[2] in TYPES
     }
+
+    @app.exception_handler(ClientDisconnect)
+    async def nobody_waits(request: Request, error: ClientDisconnect) -> Response:
+        del request, error
+        return refused(400, "the connection ended before the request was whole")
 
     @app.exception_handler(HTTPException)
     async def nothing_there(request: Request, error: HTTPException) -> Response:

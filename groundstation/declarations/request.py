@@ -67,6 +67,7 @@ class Argument:
         kind: Its type; a whole number is taken for a float, too.
         low: Least value of a number.
         high: Largest value of a number.
+        longest: Letters of a text.
         default: What it is if it is left out; None where it must be given.
     """
 
@@ -75,6 +76,7 @@ class Argument:
     kind: type[Value] = float
     low: float = -math.inf
     high: float = math.inf
+    longest: int = LONGEST_TEXT
     default: Value | None = None
 
     def read(self, given: object, action: str) -> Value:
@@ -93,7 +95,7 @@ class Argument:
             wanted = "a number" if self.kind is float else f"a value of type {self.kind.__name__}"
             raise ArgumentError(f"{action}: {self.name} is {_short(given)}, expected {wanted}")
         if isinstance(given, str):
-            return _line(given, f"{action}: {self.name}", LONGEST_TEXT)
+            return _line(given, f"{action}: {self.name}", self.longest)
         if isinstance(given, float) and not math.isfinite(given):
             raise ArgumentError(f"{action}: {self.name} is {given}, expected a finite number")
         if isinstance(given, float | int) and not self.low <= given <= self.high:

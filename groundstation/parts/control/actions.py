@@ -27,6 +27,8 @@ CHANGE_CONTROLLER = Action(
     "fly by another controller; it holds where it is until resume, where it has a program",
     (
         Argument("controller", "a row of the table of controllers", kind=str),
-        Argument("parameters", "JSON object of its parameters, as in a rig", kind=str, default="{}"),
+        Argument(
+            "parameters", "JSON object of its parameters, as in a rig", kind=str, longest=4000, default="{}"
+        ),
     ),
 )

@@ -8,7 +8,7 @@ from groundstation.control.averaging import RateMean
 from groundstation.control.controller import Controller, KeepsPlaces
 from groundstation.control.keep_in import KeepIn
 from groundstation.control.leading import lost_followers
-from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal
+from groundstation.control.state import NO_WRENCH, BodyWrench, ControlState, Goal, Vector2
 from groundstation.control.surroundings import Obstacle
 from groundstation.declarations.lease import Lease, LeaseCheck
 from groundstation.declarations.message import Message
@@ -17,7 +17,7 @@ from groundstation.declarations.request import Ack, ArgumentError, Request, answ
 from groundstation.frames import wrap_angle
 from groundstation.fusion.slope_grid import SlopeGrid
 from groundstation.parts.control.actions import CHANGE_CONTROLLER, GO_TO
-from groundstation.parts.control.laws import Law, Maker, parameters_of
+from groundstation.parts.control.laws import HOLDING, Law, Maker, parameters_of
 from groundstation.parts.control.messages import ControlStatus, Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState, control_state
 from groundstation.parts.relative_navigation.messages import LeaderState, leader_control_state
@@ -126,6 +126,7 @@ class ControllerNode(Node):
             case ControlStatus():
                 self._others.goals_table_m[message.vehicle] = message.goal_position_table_m
                 self._led_by[message.vehicle] = message.led_by
+                self._break_circle()
             case Supervision():
                 (self._down.add if message.mode in DOWN else self._down.discard)(message.vehicle)
             case FusionStatus():
@@ -199,7 +200,7 @@ class ControllerNode(Node):
         except ArgumentError as error:
             return str(error)
         x, y, heading = (float(given[name]) for name in ("x_m", "y_m", "heading_rad"))
-        if min(self._keep_in.edge_distances_m((x, y))) < 0.0:
+        if not self._is_kept_to((x, y)):
             return f"({x:.3f}, {y:.3f}) m lies outside the part of the table that vehicles keep to"
         refusal = self._others.objection((x, y))
         if not refusal:
@@ -216,15 +217,34 @@ class ControllerNode(Node):
             law = self._make(str(given["controller"]), parameters_of(str(given["parameters"])))
         except ValueError as error:  # an ArgumentError is one
             return str(error)
-        led_by = {name: self._led_by.get(name, ()) for name in self._vehicles}
-        if self.vehicle in lost_followers({**led_by, self.vehicle: law.led_by}):
+        if self._is_lost(law):
             return f"{', '.join(law.led_by)} would be led by {self.vehicle} itself: nobody would lead"
-        self._goal = self._law.setpoint(self._goal)
+        self._change_to(law)
+        return ""
+
+    def _is_lost(self, law: Law) -> bool:
+        """Whether nobody would lead this vehicle, over however many others, if it flew by a law."""
+        led_by = {name: self._led_by.get(name, ()) for name in self._vehicles}
+        return self.vehicle in lost_followers({**led_by, self.vehicle: law.led_by})
+
+    def _break_circle(self) -> None:
+        """Hold where it is if two changes at the same moment have made some follow each other."""
+        if self._make is not None and self._chosen.led_by and self._is_lost(self._chosen):
+            self._change_to(self._make(HOLDING, {}))
+
+    def _change_to(self, law: Law) -> None:
+        setpoint, own = self._law.setpoint(self._goal), self._states.get(self.vehicle)
+        if self._is_kept_to(setpoint.position_table_m):
+            self._goal = setpoint
+        elif own is not None and self._is_kept_to(own[1].position_table_m):
+            self._goal = Goal(own[1].position_table_m, own[1].heading_rad)
         self._chosen = law
         self._followed = frozenset((self.vehicle, *law.neighbours))
         self._states = {name: row for name, row in self._states.items() if name in self._followed}
         self._take_over(law.holding or law.program)
-        return ""
+
+    def _is_kept_to(self, place_m: Vector2) -> bool:
+        return min(self._keep_in.edge_distances_m(place_m)) >= 0.0
 
     def _take_over(self, law: Controller) -> None:
         if law is not self._law:

@@ -112,7 +112,10 @@ def maker_of(rig: Rig, vehicle: str) -> Maker:
             )
         if row.is_planned_together:
             raise ValueError(f"{controller} plans for all ships before they fly: name it in the rig")
-        section = ControlSection(controller=controller, parameters=dict(parameters))
+        try:
+            section = ControlSection(controller=controller, parameters=dict(parameters))
+        except ValidationError as error:
+            raise ValueError(f"change_controller{_first(error)}") from error
         law = law_of(rig, vehicle, section, "change_controller")
         touches = row.docks_with(config_of(rig, vehicle, section))
         if touches is not None and (vehicle, *touches) not in dockings_of(rig):
@@ -152,9 +155,19 @@ def parameters_of(text: str) -> dict[str, Any]:
         ValueError: They are no JSON object.
     """
     try:
-        given = json.loads(text)
+        given = json.loads(text, parse_constant=_refuse)
+    except _NoNumberError as error:
+        raise ValueError(f"change_controller: the parameters hold {error}, expected finite numbers") from None
     except (ValueError, RecursionError):
         given = None
     if not isinstance(given, dict):
         raise ValueError("change_controller: the parameters are no JSON object")
     return given
+
+
+class _NoNumberError(Exception):
+    """What JSON has no word for, and Python's reader takes."""
+
+
+def _refuse(word: str) -> None:
+    raise _NoNumberError(word)

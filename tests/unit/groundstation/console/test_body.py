@@ -39,7 +39,11 @@ WHOLE = b"GET /api/state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HT", HEAD, HEAD + b"{", WHOLE, WHOLE + b"GET /api"])
 def test_a_connection_that_asks_for_nothing_is_closed(
-    rig: Rig, source: HandSource, monkeypatch: pytest.MonkeyPatch, sent: bytes
+    rig: Rig,
+    source: HandSource,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    sent: bytes,
 ) -> None:
     monkeypatch.setattr(impatient, "PATIENCE_S", 0.05)
 
@@ -58,5 +62,6 @@ def test_a_connection_that_asks_for_nothing_is_closed(
         return answer
 
     answer = asyncio.run(try_it())
+    assert b"Traceback" not in capfd.readouterr().err.encode()
     if sent.startswith(WHOLE):
         assert json.loads(answer.partition(b"\r\n\r\n")[2])["vehicles"]

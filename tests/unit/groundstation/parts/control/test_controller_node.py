@@ -191,7 +191,7 @@ def test_nobody_follows_who_follows_it_over_however_many(flown):
         ("path", {"waypoints_m": [[0.0, 0.0]], "sped_m_s": 1.0}, "sped_m_s: is no parameter"),
         ("follow", {"leader": "nobody", "distance_m": 0.8}, "'nobody' is no other vehicle"),
         ("follow", {"leader": "alpha", "distance_m": 0.8}, "'alpha' is no other vehicle"),
-        ("go_to", {"speed_m_s": math.inf}, "speed_m_s"),
+        ("go_to", {"speed_m_s": -1.0}, "speed_m_s"),
         ("dock", {"target": "beta"}, "name the docking in the rig"),
         ("trajectory", {"places_m": [[0.0, 0.0], [1.0, 0.0]]}, "plans for all ships"),
     ],
@@ -201,6 +201,45 @@ def test_what_cannot_be_flown_is_refused_in_a_sentence_and_changes_nothing(
 ):
     assert words in change(flown, controller, **parameters)
     assert published(flown).controller == "go_to"
+
+
+def test_two_changes_at_once_that_make_a_circle_end_in_holding(flown):
+    assert change(flown, "follow", leader="beta", distance_m=0.8) == ""
+    take(flown, ControlStatus(0, "beta", "follow", (0.0, 0.0), 0.0, 0.0, 0.0, ("alpha",), ("alpha",)))
+    status = published(flown)
+    assert (status.controller, status.led_by) == ("go_to", ())
+
+
+def test_a_change_does_not_keep_a_goal_outside_the_table(flown):
+    assert change(flown, "follow", leader="beta", distance_m=2.5) == ""
+    take(flown, Request(0, "alpha", 2, "anna", "resume", "{}"))
+    for number in range(20):
+        now_ns = (1000 + 50 * number) * MS
+        take(flown, state("alpha", 1.0, 0.2, stamp_ns=now_ns), state("beta", -1.6, 0.2, stamp_ns=now_ns))
+        list(flown.tick(now_ns))
+    assert change(flown, "station") == ""
+    (x_m, y_m) = published(flown).goal_position_table_m
+    assert abs(x_m) < 2.0
+    assert abs(y_m) < 1.5
+
+
+@pytest.mark.parametrize("word", ["NaN", "Infinity", "-Infinity"])
+def test_what_is_no_number_is_named(flown, word):
+    given = json.dumps({"controller": "path", "parameters": f'{{"speed_m_s": {word}}}'})
+    (ack,) = flown.receive(Request(0, "alpha", 1, "anna", "change_controller", given), 5)
+    assert ack.reason == f"change_controller: the parameters hold {word}, expected finite numbers"
+
+
+@pytest.mark.parametrize(
+    ("controller", "parameters"),
+    [("path", {"speed_m_s": 1e308}), ("tumble", {"rate_deg_s": 1e9}), ("station", {"observer_rad_s": 1e6})],
+)
+def test_wild_numbers_are_refused_on_one_line(flown, controller, parameters):
+    reason = change(flown, controller, **parameters)
+    assert reason.startswith("change_controller")
+    assert "expected at most" in reason
+    assert "\n" not in reason
+    assert "pydantic" not in reason
 
 
 @pytest.mark.parametrize("text", ["[]", "5", "{", "[" * 400])
