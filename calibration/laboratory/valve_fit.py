@@ -45,8 +45,11 @@ Array = NDArray[np.float64]
 MOST_STEPS, SETTLED_STEPS = 40, 3
 LARGEST_STEP_S, SETTLED_S, SETTLED_SIGMAS = 4e-3, 1e-6, 0.05
 DAMPED_AFTER = 15
-"""Steps that have not settled by then go to and fro."""
+"""Steps that have not settled by then go to and fro: each side leaves out other packets at pulses' edges."""
+TO_AND_FRO_SIGMAS = 1.0
+"""The middle of two such sides is taken where they are no farther apart; half of that adds to the sigmas."""
 OUTLIER_SIGMAS = 6.0
+TIMINGS = np.arange(OPEN, SAG)
 LEAST_RISE_S = 2e-4
 EARLIEST_S = -0.02
 """A delay below zero states that the stamps are off; it is searched for, and not believed."""
@@ -155,10 +158,12 @@ def fit_valves(flight: RecordedFlight, model: ValveModel, motion: Motion, progre
         moved = np.abs(found.change[OPEN:SAG])
         excess = max(1.0, float(moved.max()) / LARGEST_STEP_S, 2.0 * (number > DAMPED_AFTER))
         value = _bounded(value + found.change / excess)
-        near = np.maximum(SETTLED_S, SETTLED_SIGMAS * np.sqrt(found.covariance.diagonal()[OPEN:SAG]))
+        sigmas = TO_AND_FRO_SIGMAS if number > DAMPED_AFTER else SETTLED_SIGMAS
+        near = np.maximum(SETTLED_S, sigmas * np.sqrt(found.covariance.diagonal()[OPEN:SAG]))
         settled = settled + 1 if (moved < near).all() else 0
         if settled >= SETTLED_STEPS:
             if is_cleaned:
+                found.covariance[TIMINGS, TIMINGS] += (0.5 * moved) ** 2
                 break
             equations.clean &= ~found.outliers
             settled, is_cleaned = 0, True
