@@ -18,6 +18,7 @@ from calibration.imu import tilt as tilt_procedure
 from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
 from groundstation.cli.plot_option import Plot
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.fusion.flight_data import FlightData
@@ -119,7 +120,7 @@ def tilt(
 
     Example: groundstation calibrate tilt level.mcap tilted.mcap --tilts tilts.csv --out tilt.toml
     """
-    check_targets(out, plot)
+    check_targets(out, plot, sources=inputs_of(*recordings, tilts, table_map))
     if not least_s >= 1.0:
         raise UsageError(f"--least-s must be 1 s or more, found {least_s:g}.")
     if not tilt_sigma_deg > 0.0:
@@ -160,7 +161,7 @@ def joint(
     from calibration.table.procedure import map_of_sources  # half of what is loaded, for one option
     from calibration.table.smoothed_flights import read_source
 
-    check_targets(out, plot, table_map)
+    check_targets(out, plot, table_map, sources=inputs_of(source))
     data = read_flight(source, vehicle)
     with refusing(source, data.notes):
         made = None if table_map is None else map_of_sources([read_source(source, None, vehicle)])[1]
@@ -178,7 +179,7 @@ def _calibrate(
     *,
     with_stars: bool = True,
 ) -> None:
-    check_targets(out, plot)
+    check_targets(out, plot, sources=inputs_of(source))
     data = read_flight(source, vehicle, with_stars=with_stars)
     with refusing(source, data.notes):
         found = procedure(data)

@@ -16,6 +16,7 @@ from calibration.laboratory.written import laboratory_json, laboratory_toml
 from calibration.result import provenance_of
 from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import png_of
 from groundstation.files.writing import Content, check_targets, write_files
@@ -39,7 +40,7 @@ def laboratory(
     numbers = out.with_suffix(".json")
     if numbers == out:
         raise UsageError(f"--out must not end in .json, found {out}: the numbers go there.")
-    check_targets(out, numbers, plot)
+    check_targets(out, numbers, plot, sources=inputs_of(source, rig))
     with refusing(source), progress_line() as progress:
         fitted = fit_laboratory(source, vehicle, rig, progress)
     provenance = provenance_of(source)

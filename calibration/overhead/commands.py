@@ -14,6 +14,7 @@ from calibration.overhead.procedure import pose_by_board
 from calibration.result import provenance_of
 from calibration.sky.pictures import printed_board
 from groundstation.cli.plot_option import Plot
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.files.writing import check_targets
 
 
@@ -37,7 +38,7 @@ def overhead(
 
     Example: groundstation calibrate overhead try/board_on_table --out pose.toml --camera-out camera.json
     """
-    check_targets(out, camera_out, plot)
+    check_targets(out, camera_out, plot, sources=inputs_of(folder))
     printed = printed_board(squares, square_mm, marker_mm, "6x4")
     views, lens = read_board_views(folder, printed)
     with refusing(folder):

@@ -20,6 +20,7 @@ from calibration.sky.survey.sweep import survey_sweep
 from calibration.sky.turns import read_turns
 from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
+from groundstation.data_sets.inputs import FRAMES, inputs_of
 from groundstation.data_sets.star_folder import find_frames
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
@@ -46,7 +47,7 @@ def lens(
 
     Example: groundstation calibrate lens try/turn --out lens.toml --camera-out camera.json
     """
-    check_targets(out, camera_out, plot)
+    check_targets(out, camera_out, plot, sources=inputs_of(folder))
     sky = read_sky_pictures(folder)
     wobble_m = None if wobble_mm is None else 1e-3 * wobble_mm
     with refusing(folder), progress_line() as progress:
@@ -70,7 +71,7 @@ def mount(
 
     Example: groundstation calibrate mount try/turn --out mount.toml --first-heading-deg 0
     """
-    check_targets(out, camera_out, plot)
+    check_targets(out, camera_out, plot, sources=inputs_of(folder))
     sky = read_sky_pictures(folder)
     heading = None if first_heading_deg is None else math.radians(first_heading_deg)
     with refusing(folder), progress_line() as progress:
@@ -102,7 +103,7 @@ def board(
     Example: groundstation calibrate board try/board --squares 9x6 --square-mm 30 --out lens.toml
     """
     cv2.setNumThreads(1)
-    check_targets(out, camera_out, plot)
+    check_targets(out, camera_out, plot, sources=[folder / FRAMES, camera])
     if camera_out is not None and camera is None:
         raise UsageError("--camera-out needs --camera, which gives the mount and the height.")
     printed = printed_board(squares, square_mm, marker_mm, "9x6")
@@ -130,7 +131,7 @@ def delay(
 
     Example: groundstation calibrate delay recordings/wiggle.mcap --out delay.toml
     """
-    check_targets(out, plot)
+    check_targets(out, plot, sources=inputs_of(source))
     turns = read_turns(source, vehicle)
     with refusing(source, turns.notes), progress_line() as progress:
         found = delay_from_headings(
@@ -171,9 +172,10 @@ def survey(
     Example: groundstation calibrate survey try/sweep --out ceiling.csv --plot ceiling.png
     """
     beside = out.with_suffix(".toml")
-    check_targets(out, beside, camera_out, plot)
     if out == beside:
         raise UsageError(f"{out}: is the name of the provenance; call the catalogue {out.stem}.csv.")
+    read = [folder / name for name in ("camera.json", "anchors.csv", FRAMES)]
+    check_targets(out, beside, camera_out, plot, sources=read)
     camera = CameraCalibration.load(folder / "camera.json")
     frames = find_frames(folder)
     names = [path.stem for path in frames]
@@ -211,9 +213,7 @@ def amend(
     Example: groundstation calibrate amend ceiling.csv run.mcap --out ceiling_new.csv
     """
     beside = out.with_suffix(".toml")
-    check_targets(out, beside)
-    beside = out.with_suffix(".toml")
-    check_targets(out, beside)
+    check_targets(out, beside, sources=inputs_of(ceiling, recording))
     with refusing(ceiling):
         text, found = amended_list(ceiling, recording, min_sightings)
     deliver(found, provenance_of(recording), beside, also={out: text})

@@ -15,6 +15,7 @@ from calibration.table.figures import draw_map
 from calibration.table.procedure import SHORTEST_WAVE_M, check_on, map_of_sources, summary_of
 from calibration.table.smoothed_flights import Bounds, read_source
 from groundstation.cli.plot_option import Plot
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import png_of
 from groundstation.files.writing import check_targets, write_files
@@ -46,7 +47,7 @@ def table_map(
     Example: groundstation calibrate table-map laps.mcap --out table_map.toml --plot table_map.png
     --leg A:-1.8,-1.3 --leg B:1.8,-1.3 --leg C:1.8,1.3 --leg D:-1.8,1.3
     """
-    check_targets(out, plot)
+    check_targets(out, out.with_suffix(".npz"), plot, sources=inputs_of(*flights, check, rig))
     legs, given = _legs(leg or []), None if bounds is None else _bounds(bounds)
     if not (math.isfinite(shortest_wave_m) and 0.15 <= shortest_wave_m <= 5.0):
         raise UsageError(f"--shortest-wave-m must lie within 0.15 and 5 m, found {shortest_wave_m:g}.")

@@ -305,7 +305,8 @@ def _check_amounts(table: Table, path: Path, column: int, name: str, most: float
         others = " or ".join(other.removeprefix("_") for other in _OTHER_UNITS.get(end, ()))
         hint = f" (is it in {others}?)" if others else ""
         line, value = table.lines[beyond[0]], values[beyond[0]]
-        raise FileError(f"{path}: line {line}, {name} is {value:g}, expected at most {most:g} {unit}{hint}.")
+        asked = f"{most:g} {unit}".rstrip()
+        raise FileError(f"{path}: line {line}, {name} is {value:g}, expected at most {asked}{hint}.")
 
 
 def _shown(text: str, most: int = _MOST_SHOWN) -> str:

@@ -14,6 +14,7 @@ import typer
 from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import progress_line
 from groundstation.data_sets.fusion_folder import read_folder
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.amounts import UNITLESS
 from groundstation.files.png import png_of
@@ -37,7 +38,6 @@ ESTIMATE_HEADER = (
     "std_x_m,std_y_m,std_heading_rad\n"
 )
 FIXES_HEADER = "t_exposure_s,used,reason,innovation_x_m,innovation_y_m,innovation_heading_rad,nis\n"
-INPUTS = ("imu.csv", "stars.csv", "meta.json", "truth.csv")
 
 
 @app.callback()
@@ -95,8 +95,6 @@ def run(
     """
     if out.name == "fixes.csv":
         raise UsageError("--out must not be called fixes.csv: the account of the fixes goes there.")
-    if out.resolve().parent == folder.resolve() and out.name in INPUTS:
-        raise UsageError(f"--out must not be {out}: that is what is read.")
     if method not in ESTIMATORS:
         raise UsageError(f"--method must be one of {', '.join(ESTIMATORS)}, found {method!r}.")
     if smooth and method != "filter":
@@ -114,7 +112,7 @@ def run(
     )
     if settings != AS_PUBLISHED and method not in PUBLISHED:
         raise UsageError(f"options of the published methods go with --method {', '.join(PUBLISHED)}.")
-    check_targets(out, out.with_name("fixes.csv"), plot)
+    check_targets(out, out.with_name("fixes.csv"), plot, sources=inputs_of(folder, table_map))
     data = read_folder(folder)
     estimator = _estimator(data.noise, method, settings, table_map, smooth=smooth)
     with progress_line() as progress:

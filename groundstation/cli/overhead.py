@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from groundstation.cli.progress import with_progress
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.data_sets.star_folder import find_frames, read_frame
 from groundstation.files.errors import FileError
 from groundstation.files.number_tables import csv_text
@@ -47,7 +48,7 @@ def overhead(
     Example: groundstation star-tracker overhead try/from_above --out answers.csv
     """
     cv2.setNumThreads(1)
-    check_targets(out)
+    check_targets(out, sources=inputs_of(folder))
     if not folder.is_dir():
         raise FileError(f"{folder}: no such folder.")
     camera = OverheadCamera.load(folder / "camera.json")

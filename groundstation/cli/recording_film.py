@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from groundstation.cli.run_progress import RunProgress
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.writing import check_targets
 from groundstation.recording.errors import RecordingError
@@ -35,7 +36,7 @@ def film(
 
     Example: groundstation recording film run.mcap --from-s 20 --to-s 60 --speed 4 --out try/fast.mp4
     """
-    check_targets(out)
+    check_targets(out, sources=inputs_of(file))
     try:
         with RunProgress(1.0) as progress:
             plan = FilmPlan(from_s, to_s, speed, fps, height, camera)

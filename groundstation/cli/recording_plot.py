@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import write_png
 from groundstation.files.writing import check_targets
@@ -33,7 +34,7 @@ def plot(
     """
     if out.suffix.lower() != ".png":  # never a picture in the place of a recording
         raise UsageError(f"{out} must end in .png: that is what is written")
-    check_targets(out)
+    check_targets(out, sources=inputs_of(file))
     try:
         with OpenedRecording(file) as recording:
             curves = curves_of(recording, field, (from_s, to_s))

@@ -45,7 +45,7 @@ def centroids(
         raise UsageError(f"--method must be one of {', '.join(METHODS)}, found {method!r}.")
     if level is not None and not 0.0 < level <= 1.0:
         raise UsageError(f"--level must be above 0 and at most 1, found {level:g}.")
-    check_targets(out, sigma)
+    check_targets(out, sigma, sources=[frames])
     cv2.setNumThreads(1)
     pictures = read_frames(frames)
     finder = SpotFinder(SpotSettings(method=method, level=level))

@@ -22,7 +22,9 @@ COLUMNS = ("run", "wx", "wy", "wz")
 def spin(
     stage: Annotated[Path, typer.Argument(help="STAGE.json: In, Ix, markers_m, f_px, camera, sigma_px.")],
     pixels: Annotated[Path, typer.Option(help="CSV of the runs: run,t,marker,u,v.")],
-    out: Annotated[Path, typer.Option(help="CSV to write: run,wx,wy,wz in rad/s, body axes, at t = 0.")],
+    out: Annotated[
+        Path, typer.Option(help="CSV to write: run,wx,wy,wz in rad/s, body axes, at t = 0; nan if unknown.")
+    ],
 ) -> None:
     """Find the rates of a stage in regular precession from a few frames of each run.
 
@@ -31,27 +33,35 @@ def spin(
 
     Example: groundstation relative spin stage.json --pixels 3frames.csv --out rates.csv
     """
-    check_targets(out)
+    check_targets(out, sources=[stage, pixels])
     case = load_stage(stage, pixels)
     runs = read_runs(pixels, case.stage)
     fits = {
         name: fit_stage(case.stage, runs[name], case.sigma_px)
         for name in with_progress(list(runs), "fitting")
     }
-    rows = [(str(name), *(f"{w:.10g}" for w in fit.rate_rad_s)) for name, fit in fits.items()]
+    rows = [(str(name), *(f"{w:.10g}" for w in _known_rate(fit))) for name, fit in fits.items()]
     write_files({out: csv_text(COLUMNS, rows)})
     _report(list(fits.values()), case.truth_rad_s)
 
 
+def _known_rate(fit: StageFit) -> NDArray[np.float64]:
+    return fit.rate_rad_s if fit.converged else np.full(3, np.nan)
+
+
 def _report(fits: list[StageFit], truth: NDArray[np.float64] | None) -> None:
-    rates = np.degrees([fit.rate_rad_s for fit in fits])
-    bad = sum(not fit.converged for fit in fits)
-    print(f"{len(fits)} runs" + (f", {bad} of them without a rest or a known rate." if bad else "."))
+    known = [fit for fit in fits if fit.converged]
+    bad = len(fits) - len(known)
+    aside = f", {bad} without a known rate (nan; left out of what follows): too little is seen of their turn"
+    print(f"{len(fits)} runs{aside if bad else ''}.")
+    if not known:
+        return
+    rates = np.degrees([fit.rate_rad_s for fit in known])
     middle = rates.mean(axis=0)
     print("mean rate, deg/s: " + " ".join(f"{w:.4f}" for w in middle))
-    expected = np.degrees(np.sqrt(np.mean([np.diag(fit.covariance)[3:] for fit in fits], axis=0)))
+    expected = np.degrees(np.sqrt(np.mean([np.diag(fit.covariance)[3:] for fit in known], axis=0)))
     print("sigma of one run by its covariance, deg/s: " + " ".join(f"{s:.4f}" for s in expected))
-    if truth is None or len(fits) < 2:
+    if truth is None or len(known) < 2:
         return
     print("axis   mean  mean|d|  D=S/(n(n-1))  sqrt(D)  sample var  sigma    rms   published M, D, sigma")
     for axis, (name, published) in enumerate(PUBLISHED_STAGE.items()):

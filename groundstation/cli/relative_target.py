@@ -64,7 +64,7 @@ def target(
 
     Example: groundstation relative target picture.png --out target.toml --f-px 750 --point 320,200,0,0.5,0
     """
-    check_targets(out)
+    check_targets(out, sources=[picture])
     image = read_frame(picture, None, is_colour=None)
     if not point:
         if out.suffix.lower() not in (".html", ".htm"):

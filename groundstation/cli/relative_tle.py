@@ -47,7 +47,7 @@ def tle(
 
     Example: groundstation relative tle progress.txt chibis.txt --out relative.csv
     """
-    check_targets(out)
+    check_targets(out, sources=[file, file2])
     first, second = _pair(file, file2)
     start = max(first.epoch, second.epoch) if at is None else _moment(at)
     try:

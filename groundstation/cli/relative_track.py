@@ -92,7 +92,7 @@ def track(
     if rate_hz is not None and not 0.0 < rate_hz <= MOST_RATE_HZ:
         raise UsageError(f"--rate-hz must be above 0 and at most {MOST_RATE_HZ:g}, found {rate_hz:g}.")
     check_annotated(annotated)
-    check_targets(out, annotated, review, rates)
+    check_targets(out, annotated, review, rates, sources=[case, target, pixels, video])
     path = case if case is not None else target
     assert path is not None
     found = load_case(path)

@@ -18,6 +18,7 @@ from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import with_progress
 from groundstation.cli.star_options import SkyOptions
 from groundstation.cli.star_pictures import PictureFolder
+from groundstation.data_sets.inputs import inputs_of
 from groundstation.data_sets.star_folder import DamagedPicture, find_frames, load_sky, read_frame
 from groundstation.declarations.errors import UsageError
 from groundstation.files.number_tables import csv_text
@@ -117,7 +118,7 @@ def solve(
     Example: groundstation star-tracker solve try/ceiling --out answers.csv --method published --image default
     """
     cv2.setNumThreads(1)
-    check_targets(out, plot)
+    check_targets(out, plot, sources=inputs_of(folder))
     added = {"uses_tree": tree, "drops_thin": drop_thin, "only_similar": only_similar, "takes_median": median}
     options = SkyOptions(method, image, identification, level, angle_limit_deg, closeness_mm, added)
     options.check()

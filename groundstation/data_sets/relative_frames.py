@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from groundstation.files.reading import read_bytes
 KEY = "frames"
 MOST_BYTES = 4_000_000_000
 """Of all frames together."""
+_HINT = f"store frames by numpy.savez(..., {KEY}={KEY})"
 
 
 def read_frames(path: Path) -> NDArray[np.uint8]:
@@ -24,15 +26,11 @@ def read_frames(path: Path) -> NDArray[np.uint8]:
         FileError: The file is missing or no archive of NumPy, or what it holds is no frames.
     """
     data = read_bytes(path)
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            names = list(getattr(archive, "files", []))
-            if KEY not in names:
-                held = ", ".join(names) or "a single array"
-                raise FileError(f"{path}: holds no array '{KEY}' ({held}).")
-            frames = archive[KEY]
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, AttributeError, TypeError) as error:
-        raise FileError(f"{path}: is no NumPy archive of frames ({error}).") from error
+    if data.startswith(np.lib.format.MAGIC_PREFIX):
+        raise FileError(f"{path}: is a single array (.npy) and no .npz: {_HINT}.")
+    if not zipfile.is_zipfile(io.BytesIO(data)):
+        raise FileError(f"{path}: is no .npz: {_HINT}.")
+    frames = _frames(data, path)
     if frames.dtype != np.uint8:
         raise FileError(f"{path}: {KEY} holds {frames.dtype}, expected 8-bit pixels (uint8).")
     if frames.ndim not in (3, 4) or (frames.ndim == 4 and frames.shape[3] != 3):
@@ -43,3 +41,15 @@ def read_frames(path: Path) -> NDArray[np.uint8]:
     if min(frames.shape[:3]) < 1 or min(frames.shape[1:3]) < 8:
         raise FileError(f"{path}: {KEY} has the shape {frames.shape}: there is no picture in it.")
     return np.asarray(frames, dtype=np.uint8)
+
+
+def _frames(data: bytes, path: Path) -> NDArray[np.generic]:
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            names: list[str] = archive.files
+            frames: NDArray[np.generic] | None = archive[KEY] if KEY in names else None
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+        raise FileError(f"{path}: is a damaged .npz, or holds objects: {_HINT}.") from error
+    if frames is None:
+        raise FileError(f"{path}: holds no array '{KEY}' ({', '.join(names) or 'nothing'}): {_HINT}.")
+    return frames

@@ -18,6 +18,7 @@ from groundstation.files.reading import read_bytes
 from groundstation.files.values import number, numbers
 from groundstation.relative_navigation.precession import AxialInertia
 from groundstation.relative_navigation.stage_spin import LeavingCamera, Stage, StageRun
+from groundstation.relative_navigation.target import MOST_POINTS, check_points
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +64,11 @@ def _markers(found: Mapping[str, Any]) -> Floats:
     rows = found.get("markers_m")
     if not isinstance(rows, list) or len(rows) < 3:
         raise ValueError("markers_m must be a list of at least three points, each x, y, z")
-    return np.array([numbers({"m": row}, "m", 3, f"markers_m[{i}]") for i, row in enumerate(rows)])
+    if len(rows) > MOST_POINTS:
+        raise ValueError(f"markers_m holds {len(rows)} points, expected at most {MOST_POINTS}")
+    markers = np.array([numbers({"m": row}, "m", 3, f"markers_m[{i}]") for i, row in enumerate(rows)])
+    check_points(markers, "markers_m")
+    return markers
 
 
 def _camera(found: Mapping[str, Any]) -> LeavingCamera:
@@ -123,5 +128,9 @@ def read_runs(path: Path, stage: Stage) -> dict[int, StageRun]:
         own = rows[rows[:, 0] == name]
         if len(np.unique(own[:, 1])) < 2 or len(own) < 6:
             raise FileError(f"{path}: run {name:g} shows fewer than two frames or six markers: no rate.")
+        shown, times = np.unique(own[:, 1:3], axis=0, return_counts=True)
+        if times.max() > 1:
+            t_s, marker = shown[times.argmax()]
+            raise FileError(f"{path}: run {name:g} shows marker {marker:g} twice at t = {t_s:g} s.")
         found[int(name)] = StageRun(own[:, 1], own[:, 2].astype(np.int64), own[:, 3:5])
     return found

@@ -1,6 +1,7 @@
 """Files written whole or not at all, alone or several together."""
 
 import errno
+import itertools
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,16 +13,19 @@ from groundstation.files.errors import FileError
 Content = bytes | str | Iterable[str]
 
 
-def check_targets(*paths: Path | None) -> None:
-    """Refuse targets that cannot be written before any work is done.
+def check_targets(*paths: Path | None, sources: Iterable[Path | None] = ()) -> None:
+    """Refuse targets that cannot be written, or must not be, before any work is done.
+
+    Args:
+        paths: What will be written; None is nothing.
+        sources: What will be read, there or not; a folder stands for the files directly in it.
 
     Raises:
-        FileError: A folder does not exist or is not ours to write in, a name is too long, or a target is
-            a folder or a device.
+        FileError: A folder does not exist or is not ours to write in, a name is too long, a target is
+            a folder or a device, one of the sources, or the same file as another target.
     """
-    for path in paths:
-        if path is None:
-            continue
+    targets = [path for path in paths if path is not None]
+    for path in targets:
         try:
             if path.is_dir():
                 raise FileError(f"{path}: cannot be written, it is a folder.")
@@ -33,6 +37,25 @@ def check_targets(*paths: Path | None) -> None:
             raise FileError(f"{path}: cannot be written ({error.strerror or error}).") from error
         if not os.access(path.parent, os.W_OK):
             raise FileError(f"{path}: cannot be written, the folder may not be written in.")
+    for path, other in itertools.combinations(targets, 2):
+        if _is_same(path, other):
+            raise FileError(f"{other}: is to be written twice: give each result a name of its own.")
+    for source in sources:
+        for path in targets:
+            if source is not None and _is_read(path, source):
+                raise FileError(f"{path}: is a file that is read: give what is written another name.")
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    """Whether two paths are one file, by links or capital letters, too; it need not be there."""
+    try:
+        return one.resolve() == other.resolve() or one.samefile(other)
+    except (OSError, RuntimeError):
+        return False
+
+
+def _is_read(path: Path, source: Path) -> bool:
+    return _is_same(path, source) or (source.is_dir() and _is_same(path.parent, source) and path.exists())
 
 
 def check_folder(path: Path) -> None:

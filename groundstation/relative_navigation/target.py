@@ -44,14 +44,7 @@ class Target:
             raise ValueError(f"points_m must be rows of x, y, z, found the shape {points.shape}")
         if not LEAST_POINTS <= len(points) <= MOST_POINTS:
             raise ValueError(f"points_m holds {len(points)} points, expected {LEAST_POINTS} to {MOST_POINTS}")
-        if not np.all(np.abs(points) <= FARTHEST_M):
-            raise ValueError(f"points_m must be finite and at most {FARTHEST_M:g} m from the body's origin")
-        extent = float(np.ptp(points, axis=0).max())
-        for a, b in itertools.combinations(range(len(points)), 2):
-            if float(np.linalg.norm(points[a] - points[b])) <= _REPEATED_SHARE * extent:
-                raise ValueError(f"points {a} and {b} of points_m are at the same place")
-        if self._thicknesses_m[1] <= _SYMMETRY_SHARE * self._thicknesses_m[0]:
-            raise ValueError("points_m lie on one line: no turn about it can be seen")
+        check_points(points, "points_m")
         _check_inertia(self.inertia_kg_m2)
 
     def __len__(self) -> int:
@@ -59,8 +52,7 @@ class Target:
 
     @cached_property
     def _thicknesses_m(self) -> Floats:
-        spread = self.points_body_m - self.points_body_m.mean(axis=0)
-        return np.linalg.svd(spread, compute_uv=False)
+        return _thicknesses(self.points_body_m)
 
     @cached_property
     def is_planar(self) -> bool:
@@ -127,6 +119,29 @@ class Target:
             if np.any(image != np.arange(len(points))):
                 found.append((rotation, image.astype(np.int64)))
         return tuple(found)
+
+
+def check_points(points_body_m: Floats, name: str) -> None:
+    """Refuse points (n, 3) whose turn cannot be seen.
+
+    Raises:
+        ValueError: They are far away, two are at the same place, or all lie on one line; the message has the
+            name.
+    """
+    if not np.all(np.abs(points_body_m) <= FARTHEST_M):
+        raise ValueError(f"{name} must be finite and at most {FARTHEST_M:g} m from the body's origin")
+    extent = float(np.ptp(points_body_m, axis=0).max())
+    for a, b in itertools.combinations(range(len(points_body_m)), 2):
+        if float(np.linalg.norm(points_body_m[a] - points_body_m[b])) <= _REPEATED_SHARE * extent:
+            raise ValueError(f"points {a} and {b} of {name} are at the same place")
+    thicknesses = _thicknesses(points_body_m)
+    if thicknesses[1] <= _SYMMETRY_SHARE * thicknesses[0]:
+        raise ValueError(f"{name} lie on one line: no turn about it can be seen")
+
+
+def _thicknesses(points: Floats) -> Floats:
+    """Of a cloud (n, 3) along its own axes, thickest first, (3,)."""
+    return np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
 
 
 def _check_inertia(inertia: Floats | None) -> None:

@@ -53,6 +53,28 @@ def test_targets_are_refused_before_any_work(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+def test_a_target_that_is_read_or_written_twice_is_refused(tmp_path):
+    there = tmp_path / "there"
+    there.write_text("1")
+    (tmp_path / "linked").symlink_to(there)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "frame").touch()
+    check_targets(tmp_path / "a", tmp_path / "b", sources=[there, None, tmp_path / "gone"])
+    check_targets(tmp_path / "folder" / "answer", sources=[tmp_path / "folder"])
+    for target, source in (
+        (there, there),
+        (tmp_path / "folder" / ".." / "there", there),
+        (tmp_path / "linked", there),
+        (tmp_path / "gone", tmp_path / "gone"),
+        (tmp_path / "folder" / "frame", tmp_path / "folder"),
+    ):
+        with pytest.raises(FileError, match="is a file that is read"):
+            check_targets(tmp_path / "a", target, sources=[None, source])
+    for one, other in ((there, there), (there, tmp_path / "linked"), (tmp_path / "a", tmp_path / "a")):
+        with pytest.raises(FileError, match="is to be written twice"):
+            check_targets(one, other)
+
+
 def test_a_pipe_or_a_device_is_never_replaced_by_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(FileError, match="it is no file"):

@@ -129,7 +129,7 @@ def test_an_unknown_method_and_an_unwritable_place_are_refused(folder, tmp_path)
     assert "--method" in refusal(folder, "--out", tmp_path / "e.csv", "--method", "guess")
     assert "cannot be written" in refusal(folder, "--out", tmp_path / "nowhere" / "e.csv")
     assert "must not be called fixes.csv" in refusal(folder, "--out", tmp_path / "fixes.csv")
-    assert "that is what is read" in refusal(folder, "--out", folder / "imu.csv")
+    assert "is a file that is read" in refusal(folder, "--out", folder / "imu.csv")
 
 
 def test_shuffled_and_broken_rows_are_survived_and_counted(folder, tmp_path):

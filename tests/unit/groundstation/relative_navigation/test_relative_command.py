@@ -127,6 +127,7 @@ def test_a_case_that_is_wrong_is_refused_in_one_sentence(call, small, tmp_path, 
         (lambda text: text + "11,44,0,1.0,2.0\n", "twice"),
         (lambda text: text.splitlines()[0] + "\n", "no "),
         (lambda text: text + "12,48,0,nan,2.0\n", "line"),
+        (lambda text: text + "12,48,0,1e7,2.0\n", r"u is 1e\+07, expected at most 1e\+06\.$"),
     ],
 )
 def test_pixels_that_are_wrong_are_refused_in_one_sentence(call, small, tmp_path, spoil, words):
@@ -158,10 +159,29 @@ def test_centroids_of_an_archive(call, tmp_path, rng):
         assert np.linalg.norm(found[:, None] - pixels[None], axis=2).min(axis=1).max() < 0.4
 
 
+def save_array(path, array):
+    with path.open("wb") as file:
+        np.save(file, array)
+
+
+def save_frames(path):
+    np.savez_compressed(path, frames=np.arange(2 * 48 * 64, dtype=np.uint8).reshape(2, 48, 64))
+
+
+def damage(path):
+    data = bytearray(path.read_bytes())
+    data[60:90] = bytes(30)
+    path.write_bytes(data)
+
+
 @pytest.mark.parametrize(
     ("save", "words"),
     [
-        (lambda p: p.write_bytes(b""), "no NumPy archive"),
+        (lambda p: p.write_bytes(b""), r"is no \.npz: store frames by numpy\.savez"),
+        (lambda p: p.write_text("plain words\n"), r"is no \.npz: store frames by numpy\.savez"),
+        (lambda p: save_array(p, np.zeros((2, 48, 64), np.uint8)), r"is a single array \(\.npy\)"),
+        (lambda p: np.savez(p, frames=np.array([{}])), r"is a damaged \.npz, or holds objects"),
+        (lambda p: (save_frames(p), damage(p)), r"is a damaged \.npz, or holds objects"),
         (lambda p: np.savez(p, other=np.zeros((2, 48, 64), np.uint8)), "no array 'frames'"),
         (lambda p: np.savez(p, frames=np.zeros((2, 48, 64))), "8-bit"),
         (lambda p: np.savez(p, frames=np.zeros((48, 64), np.uint8)), "shape"),
@@ -170,6 +190,53 @@ def test_centroids_of_an_archive(call, tmp_path, rng):
 )
 def test_archives_that_are_none_are_refused(call, tmp_path, save, words):
     save(tmp_path / "frames.npz")
-    with pytest.raises(FileError, match=words):
+    with pytest.raises(FileError, match=words) as refused:
         call("centroids", tmp_path / "frames.npz", "--out", tmp_path / "c.csv")
+    assert str(refused.value).count("frames.npz") == 1
+    assert "pickle" not in str(refused.value)
     assert not (tmp_path / "c.csv").exists()
+
+
+def _stage_and_runs(folder):
+    stage = {"In": 2.0, "Ix": 1.0, "markers_m": np.eye(3).tolist(), "f_px": 600.0, "camera": "at (4+t,0,0)"}
+    (folder / "stage.json").write_text(json.dumps(stage))
+    rows = [f"0,{t},{k},{t + k},{k}" for t in range(2) for k in range(3)]
+    (folder / "runs.csv").write_text("\n".join(["run,t,marker,u,v", *rows]) + "\n")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("centroids", "frames.npz", "--out", "frames.npz"),
+        ("centroids", "frames.npz", "--out", "c.csv", "--sigma", "frames.npz"),
+        ("centroids", "frames.npz", "--out", "c.csv", "--sigma", "c.csv"),
+        ("track", "case.json", "--pixels", "pixels.csv", "--out", "pixels.csv"),
+        ("track", "case.json", "--pixels", "pixels.csv", "--out", "case.json"),
+        ("track", "--target", "case.json", "--pixels", "pixels.csv", "--out", "case.json"),
+        ("track", "case.json", "--pixels", "pixels.csv", "--out", "x.csv", "--rates", "x.csv"),
+        ("track", "case.json", "--pixels", "pixels.csv", "--out", "x.csv", "--rates", "pixels.csv"),
+        ("track", "case.json", "--video", "frames.npz", "--out", "frames.npz"),
+        ("track", "case.json", "--video", "frames", "--out", "frames/0.png"),
+        ("track", "case.json", "--video", "film.avi", "--out", "x.csv", "--annotated", "film.avi"),
+        ("track", "case.json", "--video", "film.avi", "--out", "x.html", "--review", "x.html"),
+        ("track", "case.json", "--pixels", "pixels.csv", "--out", "linked.csv"),
+        ("spin", "stage.json", "--pixels", "runs.csv", "--out", "runs.csv"),
+        ("spin", "stage.json", "--pixels", "runs.csv", "--out", "stage.json"),
+        ("target", "frames/0.png", "--out", "frames/0.png"),
+        ("tle", "two.txt", "--out", "two.txt"),
+        ("tle", "two.txt", "other.txt", "--out", "other.txt"),
+    ],
+    ids=" ".join,
+)
+def test_nothing_is_written_over_what_is_read_nor_twice(call, small, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    save_frames(tmp_path / "frames.npz")
+    _stage_and_runs(tmp_path)
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "linked.csv").hardlink_to("pixels.csv")
+    for name in ("film.avi", "two.txt", "other.txt", "frames/0.png"):
+        (tmp_path / name).write_bytes(b"never looked at")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(FileError, match=r"is a file that is read: give|is to be written twice: give"):
+        call(*words)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before

@@ -112,6 +112,9 @@ def test_the_command_gives_a_rate_for_every_run(groundstation, files, tmp_path):
     [
         ({"Ix": 40000.0}, "of no body"),
         ({"markers_m": [[0, 0, 0]]}, "markers_m"),
+        ({"markers_m": [[0.5, 0, 1]] * 6}, "points 0 and 1 of markers_m are at the same place"),
+        ({"markers_m": [[0, 0, 0], [1, 0, 0], [2, 0, 0]]}, "markers_m lie on one line"),
+        ({"markers_m": [[0, 0, 0], [1e9, 0, 0], [0, 2, 0]]}, "markers_m must be finite and at most 1000 m"),
         ({"camera": "somewhere"}, "camera must tell"),
         ({"f_px": 0}, "f_px"),
         ({"sigma_px": {"3frames": "much"}}, "sigma_px.3frames"),
@@ -130,3 +133,24 @@ def test_a_run_of_one_frame_is_refused(groundstation, files, tmp_path):
     files[1].write_text(text)
     with pytest.raises(FileError, match="run 7"):
         groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
+
+
+def test_a_marker_seen_twice_in_a_frame_is_refused(groundstation, files, tmp_path):
+    lines = files[1].read_text().splitlines()
+    files[1].write_text("\n".join([*lines, lines[1]]) + "\n")
+    with pytest.raises(FileError, match="run 0 shows marker 0 twice at t = 0 s"):
+        groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
+
+
+def test_an_unknown_rate_is_nan_and_no_part_of_the_statistics(groundstation, files, tmp_path):
+    out = tmp_path / "rates.csv"
+    words = ("relative", "spin", files[0], "--pixels", files[1], "--out", out)
+    before = groundstation(*words).output.splitlines()
+    nowhere = "".join(f"9,{t},{k},1e6,-1e6\n" for t in (0, 0.5, 1) for k in range(6))
+    files[1].write_text(files[1].read_text() + nowhere)
+    after = groundstation(*words).output.splitlines()
+    assert after[0].startswith("4 runs, 1 without a known rate")
+    assert after[1:] == before[1:]
+    assert out.read_text().splitlines()[-1] == "9,nan,nan,nan"
+    files[1].write_text("run,t,marker,u,v\n" + nowhere)
+    assert len(groundstation(*words).output.splitlines()) == 1
