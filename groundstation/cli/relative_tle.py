@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +17,7 @@ from groundstation.files.reading import read_bytes, text_of
 from groundstation.files.writing import check_targets, write_files
 from groundstation.relative_navigation.two_line_elements import (
     ACCURACY,
+    LIMITS,
     RelativeState,
     TwoLineElements,
     moments,
@@ -41,7 +43,8 @@ def tle(
     """Find the second object as seen from the first, from two-line elements by SGP4: kilometres, no better.
 
     Axes of the first object: x radial up, y along-track, z along the orbit's normal; velocities are those
-    seen in these axes, which turn; c1_m to c6_m are the constants of Hill's equations that begin there.
+    seen in these axes, which turn; c1_m to c6_m are the constants of Hill's equations that begin there, nan
+    where distances are not small beside the orbit's radius, or the orbit is far from circular.
 
     Example: groundstation relative tle two.txt --at 2012-01-25T02:18:00 --minutes 0:90:1 --out relative.csv
 
@@ -59,25 +62,30 @@ def tle(
     except ValueError as error:
         raise UsageError(f"{error}.") from error
     write_files({out: csv_text(COLUMNS, [_row(state, start) for state in states])})
-    _report(first, second, states[0])
+    _report(first, second, states)
 
 
 def _pair(file: Path, file2: Path | None) -> tuple[TwoLineElements, TwoLineElements]:
     found = _read(file)
     if file2 is None:
         if len(found) != 2:
-            raise FileError(f"{file}: holds {len(found)} element sets, expected 2, or one and another file.")
+            names = f" ({', '.join(each.name for each in found)})" if found else ""
+            raise FileError(
+                f"{file}: holds {len(found)} element sets{names}, expected 2: leave those of the two objects "
+                "in it, or give a file for each."
+            )
         return found[0], found[1]
     other = _read(file2)
     for path, sets in ((file, found), (file2, other)):
         if len(sets) != 1:
-            raise FileError(f"{path}: holds {len(sets)} element sets, expected 1 of two files.")
+            raise FileError(f"{path}: holds {len(sets)} element sets, expected 1 in each of two files.")
     return found[0], other[0]
 
 
 def _read(path: Path) -> list[TwoLineElements]:
+    text = text_of(read_bytes(path), path)
     try:
-        return parse_elements(text_of(read_bytes(path), path))
+        return parse_elements(text)
     except ValueError as error:
         raise FileError(f"{path}: {error}.") from error
 
@@ -85,9 +93,9 @@ def _read(path: Path) -> list[TwoLineElements]:
 def _moment(text: str) -> datetime:
     try:
         found = datetime.fromisoformat(text)
-    except ValueError as error:
+        return found.replace(tzinfo=UTC) if found.tzinfo is None else found.astimezone(UTC)
+    except (ValueError, OverflowError) as error:
         raise UsageError(f"--at must be a moment such as 2012-01-25T02:18:00, found {text!r}.") from error
-    return found.replace(tzinfo=UTC) if found.tzinfo is None else found.astimezone(UTC)
 
 
 def _minutes(text: str) -> tuple[float, float, float]:
@@ -106,19 +114,20 @@ def _number(text: str) -> float:
 
 
 def _row(state: RelativeState, start: datetime) -> tuple[str, ...]:
-    constants = state.constants
+    c = state.constants
     numbers = (
         (state.when - start).total_seconds() / 60.0,
         *state.position_m,
         *state.velocity_m_s,
         float(np.linalg.norm(state.position_m)),
         state.rate_rad_s,
-        *(constants.c1, constants.c2, constants.c3, constants.c4, constants.c5, constants.c6),
+        *((math.nan,) * 6 if c is None else (c.c1, c.c2, c.c3, c.c4, c.c5, c.c6)),
     )
     return (f"{state.when:%Y-%m-%dT%H:%M:%S.%f}Z", *(f"{x + 0.0:.10g}" for x in numbers))
 
 
-def _report(first: TwoLineElements, second: TwoLineElements, state: RelativeState) -> None:
+def _report(first: TwoLineElements, second: TwoLineElements, states: list[RelativeState]) -> None:
+    state = states[0]
     for what, each in (("first", first), ("second", second)):
         model = "deep space" if each.is_deep_space else "near Earth"
         print(
@@ -130,10 +139,18 @@ def _report(first: TwoLineElements, second: TwoLineElements, state: RelativeStat
     if first.number == second.number:
         print(f"both sets are of object {first.number}")
     x, y, z = (1e-3 * state.position_m + 0.0).tolist()
-    constants = state.constants
     print(f"{state.when:%Y-%m-%dT%H:%M:%SZ}: up {x:.3f} km, along-track {y:.3f} km, normal {z:.3f} km")
-    print(
-        f"C1 = {constants.c1:.4g} m: the ellipse wanders {constants.drift_m_rev + 0.0:.4g} m a revolution; "
-        f"half axes {', '.join(f'{axis:.4g}' for axis in constants.semi_axes_m)} m (up, along-track, normal)"
-    )
+    constants = state.constants
+    if constants is not None:
+        axes = ", ".join(f"{axis:.4g}" for axis in constants.semi_axes_m)
+        print(
+            f"C1 = {constants.c1:.4g} m: the ellipse wanders {constants.drift_m_rev + 0.0:.4g} m a "
+            f"revolution; half axes {axes} m (up, along-track, normal)"
+        )
+    without = sum(each.constants is None for each in states)
+    if without:
+        print(
+            f"c1_m to c6_m are nan at {without} of {len(states)} moments: Hill's equations do not hold "
+            f"there. {LIMITS}"
+        )
     print(ACCURACY)

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.errors import RecordingError
+from groundstation.studies.running import StudyInterrupted
 from groundstation.studies.running import reproduce as run_study
 from groundstation.studies.study import FigureRow, Study
 from groundstation.studies.table import studies
@@ -30,15 +31,16 @@ def reproduce(
     """Run a published experiment again: each figure beside the published number, and with our defaults.
 
     Data are made by the emulator under the published condition, as far as it is stated; what had to be
-    assumed stands beside each figure, and a number that does not come out is shown as such.
+    assumed stands beside each figure, and a number that does not come out is shown as such. A folder that
+    holds a report with more figures than are asked for is refused; one of the same or fewer is replaced.
 
     Example: groundstation reproduce
 
     Example: groundstation reproduce air-table --out try/air_table
 
-    Example: groundstation reproduce air-table --out try/air_table --figure 16
+    Example: groundstation reproduce air-table --out try/figure_16 --figure 16
 
-    Example: groundstation reproduce chibis --out try/chibis --figure 2.12
+    Example: groundstation reproduce chibis --out try/figure_2_12 --figure 2.12
     """
     known = studies()
     if study is None:
@@ -62,6 +64,10 @@ def reproduce(
             )
         except RecordingError as error:
             raise UsageError(str(error)) from error
+        except StudyInterrupted as stop:
+            bar.stop()
+            sys.stderr.write(f"groundstation: {stop}\n")
+            raise typer.Exit(130) from stop
     for path in written:
         print(path)
 

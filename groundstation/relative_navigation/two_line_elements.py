@@ -10,16 +10,16 @@ are those of date; the difference of two places is turned into the ``orbital`` a
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
-from sgp4.api import SGP4_ERRORS, Satrec
+from sgp4.api import Satrec
 from sgp4.conveniences import sat_epoch_datetime
 from sgp4.io import compute_checksum
 
+from groundstation.relative_navigation.element_columns import EARTH_RADIUS_M, check_columns
 from groundstation.relative_navigation.hill import HillConstants, hill_constants
 
 Floats = NDArray[np.float64]
@@ -30,23 +30,21 @@ ACCURACY = (
     "kilometres worse each day: the difference is no better, and tells nothing of distances below that."
 )
 """What a result has to be read with."""
-EARTH_RADIUS_M = 6378135.0
-"""Of the equator in WGS 72, the constants of SGP4."""
 MOST_AGE_DAYS = 30.0
 """Elements that are older at the moment asked for are refused."""
 DEEP_SPACE_S = 225.0 * 60.0
 _DAY_S = 86400.0
-_FORMS = (
-    re.compile(
-        r"1 [ \dA-Z]\d{4}[A-Z ] [\dA-Z ]{8} [\d ]{5}\.\d{8} [-+ ]\.\d{8} [-+ ][\d ]\d{4}[-+ ]\d "
-        r"[-+ ][\d ]\d{4}[-+ ]\d [\d ] [ \d]{4}\d"
-    ),
-    re.compile(
-        r"2 [ \dA-Z]\d{4} [ \d]{3}\.\d{4} [ \d]{3}\.\d{4} \d{7} [ \d]{3}\.\d{4} [ \d]{3}\.\d{4} "
-        r"[ \d]{2}\.\d{8}[ \d]{5}\d"
-    ),
+_NEAR_SHARE = 0.05
+"""Of the orbit's radius: farther apart, Hill's equations are off by more than some percent."""
+_CIRCULAR = 0.1
+"""So eccentric an orbit is still near a circular one."""
+LIMITS = (
+    f"They need distances within {_NEAR_SHARE:.0%} of the orbit's radius, and an eccentricity of at most "
+    f"{_CIRCULAR:g}."
 )
-"""What stands in which columns, line 1 and line 2."""
+"""Of the constants, for people."""
+_CAME_DOWN = 6
+"""Error of the library: the object decayed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +83,11 @@ class TwoLineElements:
         return float(self.lines[1][52:63]) * math.tau / _DAY_S
 
     @property
+    def eccentricity(self) -> float:
+        """Mean, as the line has it."""
+        return float(f"0.{self.lines[1][26:33]}")
+
+    @property
     def semi_major_axis_m(self) -> float:
         """Mean, as the model takes it from the mean motion (Brouwer's: the oblate Earth is in it)."""
         return float(self.record.a) * EARTH_RADIUS_M
@@ -109,8 +112,8 @@ class RelativeState:
         position_m: In orbital axes of the first, (3,).
         velocity_m_s: As seen in these axes, which turn, (3,).
         rate_rad_s: How fast they turn.
-        constants: Of Hill's equations that begin there; they hold near a circular orbit and for distances
-            small beside its radius.
+        constants: Of Hill's equations that begin there; None where these do not hold: they need an orbit near
+            a circular one and distances small beside its radius.
         height_m: Of the first above the equator's radius.
     """
 
@@ -118,7 +121,7 @@ class RelativeState:
     position_m: Floats
     velocity_m_s: Floats
     rate_rad_s: float
-    constants: HillConstants
+    constants: HillConstants | None
     height_m: float
 
 
@@ -158,7 +161,7 @@ def _object(name: str, number: int, first: str, next_number: int, second: str) -
         )
     record = Satrec.twoline2rv(*lines)
     if record.error:
-        raise ValueError(f"line {next_number}: {SGP4_ERRORS[record.error]}")
+        raise ValueError(f"line {next_number}: eccentricity, mean motion and drag together are of no orbit")
     return TwoLineElements(name or lines[0][2:7].strip(), lines, tuple(notes))
 
 
@@ -177,8 +180,10 @@ def _checked(line: str, kind: int, number: int, notes: list[str]) -> str:
         raise ValueError(
             f"line {number}: checksum is {line[-1]}, the line adds up to {compute_checksum(line)}"
         )
-    if not _FORMS[kind - 1].fullmatch(line):
-        raise ValueError(f"line {number}: a column holds what no element set has there")
+    try:
+        check_columns(line, kind)
+    except ValueError as error:
+        raise ValueError(f"line {number}: {error}") from error
     return line
 
 
@@ -195,8 +200,9 @@ def teme_state(elements: TwoLineElements, when: datetime) -> tuple[Floats, Float
             f"its elements, at most {MOST_AGE_DAYS:g} are taken"
         )
     error, position_km, velocity_km_s = elements.record.sgp4_tsince(age_s / 60.0)
-    if error:
-        raise ValueError(f"{elements.name} at {when:%Y-%m-%dT%H:%M:%SZ}: {SGP4_ERRORS[error]}")
+    if error or not np.all(np.isfinite((position_km, velocity_km_s))):
+        why = "it has come down by then" if error == _CAME_DOWN else "its elements are of no orbit there"
+        raise ValueError(f"{elements.name} at {when:%Y-%m-%dT%H:%M:%SZ}: {why}")
     return 1e3 * np.array(position_km), 1e3 * np.array(velocity_km_s)
 
 
@@ -212,8 +218,10 @@ def relative_state(first: TwoLineElements, second: TwoLineElements, when: dateti
     away = axes @ (other - position)
     spin = np.array((0.0, 0.0, rate))
     speed = axes @ (other_velocity - velocity) - np.cross(spin, away)
-    constants = hill_constants(away, speed, first.mean_motion_rad_s)
-    height = float(np.linalg.norm(position)) - EARTH_RADIUS_M
+    radius = float(np.linalg.norm(position))
+    is_near = float(np.linalg.norm(away)) <= _NEAR_SHARE * radius and first.eccentricity <= _CIRCULAR
+    constants = hill_constants(away, speed, first.mean_motion_rad_s) if is_near else None
+    height = radius - EARTH_RADIUS_M
     return RelativeState(when, away, speed, rate, constants, height)
 
 
@@ -231,11 +239,19 @@ def moments(start: datetime, minutes: tuple[float, float, float]) -> list[dateti
 
     Raises:
         ValueError: The step is not above zero, the last lies before the first, they are too many, or lie
-            beyond the calendar.
+            where no elements are taken.
     """
     first, last, step = minutes
     if not (all(map(math.isfinite, minutes)) and step > 0.0 and last >= first):
         raise ValueError("minutes must be FIRST:LAST:STEP with a step above zero")
+    farthest_days = max(abs(first), abs(last)) / 1440.0
+    if farthest_days > 2.0 * MOST_AGE_DAYS:
+        raise ValueError(
+            f"minutes reach {farthest_days:.4g} days away, at most {MOST_AGE_DAYS:g} days from the epoch of "
+            "the elements are taken"
+        )
+    if (last - first) / step > 1e9:
+        raise ValueError("minutes ask for over a thousand million moments, at most 1000000 are taken")
     count = math.floor((last - first) / step + 1e-9) + 1
     if count > 1_000_000:
         raise ValueError(f"minutes ask for {count} moments, at most 1000000 are taken")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +99,7 @@ def fly_flight(scenario_file: Path, rig_file: Path, recording: Path, progress: P
     Args:
         scenario_file: The experiment; its own rig is not looked at.
         rig_file: The rig that flies it.
-        recording: To write; one that is there already is replaced.
+        recording: To write; one that is there already is replaced once the flight is over.
         progress: Called now and then.
 
     Raises:
@@ -107,8 +108,10 @@ def fly_flight(scenario_file: Path, rig_file: Path, recording: Path, progress: P
     """
     content = content_of(read_text(scenario_file, WHAT), scenario_file)
     scenario = made(content, scenario_file, load_rig(rig_file))
-    recording.unlink(missing_ok=True)
-    fly_recorded(scenario, seed_for(scenario, None), recording, progress)
+    with TemporaryDirectory(dir=recording.parent, prefix=".part.") as unfinished:
+        flying = Path(unfinished) / recording.name
+        fly_recorded(scenario, seed_for(scenario, None), flying, progress)
+        flying.replace(recording)
     return read_flown(recording)
 
 

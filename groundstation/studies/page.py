@@ -40,7 +40,7 @@ def render_page(study: Study, drawn: Sequence[tuple[FigureRow, Drawn]]) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
-        f"<title>{escape(study.name)}, run again</title>\n<style>\n{style}{STYLE}</style>\n</head>\n"
+        f"<title>{escape(title_of(study))}</title>\n<style>\n{style}{STYLE}</style>\n</head>\n"
         f"<body>\n{''.join(body)}</body>\n</html>\n"
     )
 
@@ -49,7 +49,8 @@ def _head(study: Study, drawn: Sequence[tuple[FigureRow, Drawn]]) -> str:
     compared = [number.comes_out for _, found in drawn for number in found.numbers]
     good, bad = compared.count(True), compared.count(False)
     entries = "".join(
-        f'<li><a href="#{_anchor(row)}">{escape(row.label)}</a>: {escape(row.title)}</li>' for row, _ in drawn
+        f'<li><a href="#{anchor_of(row)}">{escape(row.label)}</a>: {escape(row.title)}</li>'
+        for row, _ in drawn
     )
     return (
         f"<header>\n<h1>{escape(study.title)}, run again</h1>\n<p>{escape(study.source)}</p>\n"
@@ -66,7 +67,13 @@ def _does_not(count: int) -> str:
     return f', <span class="out">{count} {"does" if count == 1 else "do"} not</span>'
 
 
-def _anchor(row: FigureRow) -> str:
+def title_of(study: Study) -> str:
+    """What a page is called."""
+    return f"{study.name}, run again"
+
+
+def anchor_of(row: FigureRow) -> str:
+    """Name of a figure's section in the page."""
     return f"{row.kind}-{row.numbers[0]}"
 
 
@@ -76,7 +83,7 @@ def _figure(row: FigureRow, found: Drawn) -> str:
         for caption, svg in found.pictures
     )
     return (
-        f'<section id="{_anchor(row)}">\n<h2>{escape(row.label)}: {escape(row.title)}</h2>\n'
+        f'<section id="{anchor_of(row)}">\n<h2>{escape(row.label)}: {escape(row.title)}</h2>\n'
         f"<p><b>Published:</b> {escape(row.published)}</p>\n<p>{escape(found.words)}</p>\n{pictures}"
         f"{_numbers(found.numbers)}{_assumed(row.assumed)}</section>\n"
     )

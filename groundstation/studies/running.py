@@ -9,8 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.files.writing import check_folder, write_files
+from groundstation.studies.held import PAGE, RESULTS, check_held
 from groundstation.studies.page import render_page
 from groundstation.studies.study import Drawn, FigureRow, Progress, Study
+
+
+class StudyInterrupted(KeyboardInterrupt):
+    """Ctrl-C while a study was run; the message is a sentence on what is finished and what is not."""
 
 
 def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress: Progress) -> list[Path]:
@@ -26,11 +31,42 @@ def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress
         The files written, the page first.
 
     Raises:
-        UsageError: A file is wrong, or cannot be written.
+        UsageError: A file is wrong, or cannot be written, or the folder holds more than is asked for.
         GroundStationError: A recording cannot be written any further.
+        StudyInterrupted: Ctrl-C came.
     """
     check_folder(folder)
+    check_held(study, figures, folder)
     folder.mkdir(parents=True, exist_ok=True)
+    before = _files_in(folder)
+    doing = ["beginning"]
+
+    def noted(text: str, share: float) -> None:
+        doing[0] = text
+        progress(text, share)
+
+    try:
+        return _reproduced(study, figures, folder, noted)
+    except KeyboardInterrupt as stop:
+        finished = [name for name, stamp in _files_in(folder).items() if before.get(name) != stamp]
+        raise StudyInterrupted(_stopped(folder, doing[0], finished)) from stop
+
+
+def _files_in(folder: Path) -> dict[str, int]:
+    """When each file was written, ns, by its name in the folder."""
+    found = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in found}
+
+
+def _stopped(folder: Path, doing: str, finished: Sequence[str]) -> str:
+    made = f"finished in {folder}: {', '.join(finished)}" if finished else f"nothing was finished in {folder}"
+    if {PAGE, RESULTS} <= set(finished):
+        return f"interrupted at the end: {made}."
+    old = "; those that are there are of an earlier run" if (folder / PAGE).exists() else ""
+    return f"interrupted while {doing}: {made}; {PAGE} and {RESULTS} were not written{old}."
+
+
+def _reproduced(study: Study, figures: Sequence[FigureRow], folder: Path, progress: Progress) -> list[Path]:
     names = [name for name in study.sources if any(name in row.needs for row in figures)]
     whole = 1.0 + sum(study.sources[name].size for name in names)
     made: dict[str, Any] = {}
@@ -47,7 +83,7 @@ def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress
     for figure in figures:
         progress(f"drawing {figure.label.lower()}", (done + len(drawn) / len(figures)) / whole)
         drawn.append((figure, figure.draw({name: made[name] for name in figure.needs})))
-    page, results = folder / "report.html", folder / "results.json"
+    page, results = folder / PAGE, folder / RESULTS
     write_files(
         {
             page: render_page(study, drawn),

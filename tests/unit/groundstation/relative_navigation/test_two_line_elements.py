@@ -1,6 +1,7 @@
 """Two-line elements: published vectors of SGP4, the published lines and their defects, differences of two."""
 
 import csv
+import re
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -52,6 +53,12 @@ def signed(line):
     """A line with its checksum."""
     body = line[:68]
     return body + str(sum(int(c) if c.isdigit() else c == "-" for c in body) % 10)
+
+
+def changed(which, old, new):
+    """The example with a field of other content."""
+    assert EXAMPLE[which].count(old) == 1
+    return signed(EXAMPLE[which].replace(old, new))
 
 
 @pytest.mark.parametrize(
@@ -111,14 +118,69 @@ def test_the_full_stop_of_a_sentence_is_left_out_and_noted():
         ((EXAMPLE[1],), "line 1: expected line 1"),
         (("NAME", "OTHER"), "line 2: expected line 1"),
         (("NAME",), "line 1: an element set is missing behind 'NAME'"),
-        ((EXAMPLE[0], signed(EXAMPLE[1].replace("34.9848", "34,9848"))), "line 2: a column holds"),
-        ((EXAMPLE[0], signed(EXAMPLE[1].replace("15.74091534", "00.00000000"))), "line 2: "),
+        (
+            (EXAMPLE[0], signed(EXAMPLE[1].replace("34.9848", "34,9848"))),
+            "line 2: columns 9 to 16 hold ' 34,98",
+        ),
+        ((EXAMPLE[0].replace("U 97", "u 97"), EXAMPLE[1]), "line 1: column 8 holds 'u', expected the class"),
+        ((EXAMPLE[0].replace("74A", "74a"), EXAMPLE[1]), "line 1: columns 10 to 17 hold '97074a  '"),
+        ((EXAMPLE[0].replace("A   0", "A  _0"), EXAMPLE[1]), "line 1: column 18 holds '_', expected a space"),
+        (
+            (changed(0, "065.47684936", "999.47684936"), EXAMPLE[1]),
+            "line 1: day 999.477 (columns 21 to 32) is",
+        ),
+        ((changed(0, "065.47684936", "366.00000000"), EXAMPLE[1]), "is none of a year, here 2001"),
+        ((changed(0, "065.47684936", "000.47684936"), EXAMPLE[1]), "is none of a year"),
+        (
+            (EXAMPLE[0], changed(1, " 34.9848", "180.9848")),
+            "the inclination (columns 9 to 16) is 180.985 deg",
+        ),
+        (
+            (EXAMPLE[0], changed(1, "213.3710", "361.0000")),
+            "the ascending node (columns 18 to 25) is 361 deg",
+        ),
+        ((EXAMPLE[0], changed(1, "234.2325", "500.0000")), "the argument of the perigee (columns 35 to 42)"),
+        (
+            (EXAMPLE[0], changed(1, "124.0029", "999.9000")),
+            "the mean anomaly (columns 44 to 51) is 999.9 deg",
+        ),
+        (
+            (EXAMPLE[0], changed(1, "15.74091534", "00.00000000")),
+            "the mean motion (columns 53 to 63) is 0 rev",
+        ),
+        ((EXAMPLE[0], changed(1, "15.74091534", "99.00000000")), "is 99 revolutions a day, expected 0.03 to"),
+        ((EXAMPLE[0], changed(1, "0001408", "9999999")), "the eccentricity (columns 27 to 33) is 1: with"),
+        ((EXAMPLE[0], changed(1, "0001408", "3000000")), "km below the ground"),
     ],
 )
 def test_wrong_lines_are_refused_in_words(lines, words):
     with pytest.raises(ValueError, match=r"^line") as refused:
         parse_elements(text(lines))
     assert words in str(refused.value)
+
+
+def refusal(lines):
+    try:
+        (first,) = parse_elements(lines)
+        relative_state(first, first, first.epoch + timedelta(days=1))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def test_lines_with_other_letters_are_carried_on_or_refused_by_line(rng):
+    """Whatever stands in the columns: a state, or a sentence that names the line or the object."""
+    letters = list("0123456789 .-+aZ")
+    carried = 0
+    for _ in range(3000):
+        lines = [list(line[:68]) for line in PROGRESS]
+        for _ in range(rng.integers(1, 4)):
+            lines[rng.integers(2)][rng.integers(2, 68)] = rng.choice(letters)
+        lines[1][2:7] = lines[0][2:7]
+        refused = refusal(text([signed("".join(line)) for line in lines]))
+        assert re.match(r"$|line [12]: |.+ at 20\d\d-", refused), refused
+        carried += not refused
+    assert carried > 100
 
 
 def test_names_above_the_lines_are_taken():
@@ -181,6 +243,7 @@ def files(tmp_path):
     (tmp_path / "both.txt").write_text(
         "PROGRESS\n" + text((PROGRESS[0], PROGRESS[1] + ".")) + text((PROGRESS[0], ahead))
     )
+    (tmp_path / "three.txt").write_text(text(PROGRESS, PROGRESS, PROGRESS))
     (tmp_path / "one.txt").write_text(text(PROGRESS))
     (tmp_path / "other.txt").write_text(text((PROGRESS[0], ahead)))
     return tmp_path
@@ -215,8 +278,8 @@ def test_one_object_given_twice_is_named_and_zero_has_no_sign(groundstation, fil
 @pytest.mark.parametrize(
     ("words", "error", "sentence"),
     [
-        (("one.txt",), FileError, "holds 1 element sets, expected 2"),
-        (("both.txt", "one.txt"), FileError, "holds 2 element sets, expected 1"),
+        (("one.txt",), FileError, r"holds 1 element sets \(00181\), expected 2: leave those of the two"),
+        (("both.txt", "one.txt"), FileError, "holds 2 element sets, expected 1 in each of two files"),
         (("both.txt", "--at", "today"), UsageError, "--at must be a moment"),
         (("both.txt", "--minutes", "0:1"), UsageError, "expected three numbers FIRST:LAST:STEP"),
         (
@@ -224,7 +287,12 @@ def test_one_object_given_twice_is_named_and_zero_has_no_sign(groundstation, fil
             UsageError,
             "--minutes is '0:1:x': expected three numbers FIRST:LAST:STEP, found 'x'",
         ),
-        (("both.txt", "--minutes", "1e12:1e12:1"), UsageError, "beyond the calendar"),
+        (("both.txt", "--minutes", "1e12:1e12:1"), UsageError, "at most 30 days from the epoch"),
+        (("both.txt", "--minutes", "0:1e300:1e299"), UsageError, "at most 30 days from the epoch"),
+        (("both.txt", "--minutes", "0:60:1e-300"), UsageError, "at most 1000000 are taken"),
+        (("both.txt", "--at", "9999-12-31T23:59:59", "--minutes", "0:1:1"), UsageError, "calendar"),
+        (("both.txt", "--at", "0001-01-01T00:00:00+05:00"), UsageError, "--at must be a moment"),
+        (("three.txt",), FileError, r"holds 3 element sets \(00181, 00181, 00181\), expected 2: leave"),
         (("both.txt", "--at", "2013-01-25T00:00:00"), UsageError, "days from the epoch"),
         (("nothing.txt",), FileError, "nothing.txt"),
     ],
@@ -234,3 +302,16 @@ def test_what_the_command_cannot_do_it_says(groundstation, files, words, error, 
     with pytest.raises(error, match=sentence):
         groundstation("relative", "tle", *given, "--out", files / "out.csv")
     assert not (files / "out.csv").exists()
+
+
+def test_constants_of_hill_are_left_out_where_the_equations_do_not_hold(groundstation, files):
+    far = signed(PROGRESS[1].replace("111.9298", "291.9298"))
+    (files / "far.txt").write_text(text(PROGRESS, (PROGRESS[0], far)))
+    (files / "eccentric.txt").write_text(text(MOLNIYA, MOLNIYA))
+    for name in ("far.txt", "eccentric.txt"):
+        out = files / "relative.csv"
+        printed = groundstation("relative", "tle", files / name, "--minutes", "0:2:1", "--out", out).stdout
+        assert "c1_m to c6_m are nan at 3 of 3 moments: Hill's equations do not hold there" in printed
+        assert "C1 =" not in printed
+        assert all(row[f"c{k}_m"] == "nan" for row in read(out) for k in range(1, 7))
+        assert all(np.isfinite(float(row["distance_m"])) for row in read(out))

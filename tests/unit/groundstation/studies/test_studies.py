@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from groundstation.studies.air_table.study import AIR_TABLE
 from groundstation.studies.flown import FlightRow
 from groundstation.studies.page import render_page
 from groundstation.studies.plots import Axes, Line, Plan, over_time
-from groundstation.studies.running import reproduce, results_of
+from groundstation.studies.running import StudyInterrupted, reproduce, results_of
 from groundstation.studies.study import DEFAULT, PUBLISHED, Drawn, FigureRow, Generated, Number, Study
 
 DRAWN = Drawn(
@@ -229,3 +229,87 @@ def test_a_plan_keeps_its_scale_along_both_axes():
     assert x1 - x0 == pytest.approx(y0 - y1)  # y grows upwards on the table
     drawn = plan.asterisks(np.array([0.0]), np.array([0.0]), "failure") + plan.arrows(*np.zeros((4, 1)))
     assert drawn.count("<path") == 2
+
+
+def of_figures(*numbers, draw=lambda data: DRAWN, name="made"):
+    rows = tuple(replace(ROW, numbers=(number,), draw=draw) for number in numbers)
+    return replace(STUDY, name=name, figures=rows)
+
+
+@pytest.mark.parametrize(
+    ("before", "words"),
+    [
+        (of_figures(1, 2, 3), r"holds 1 more of the study \(figure 3\), and its report would be replaced"),
+        (of_figures(3), "holds 1 more"),
+        (of_figures(1, name="another"), "holds results of something else than made: give another --out"),
+    ],
+)
+def test_a_report_that_shows_more_is_not_replaced(tmp_path, before, words):
+    reproduce(before, before.figures, tmp_path, lambda text, done: None)
+    held = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    whole = of_figures(1, 2, 3)
+    with pytest.raises(UsageError, match=words):
+        reproduce(whole, whole.figures[:2], tmp_path, lambda text, done: None)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == held
+
+
+@pytest.mark.parametrize("name", ["report.html", "results.json"])
+def test_a_file_of_something_else_is_not_replaced(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(UsageError, match="holds results of something else"):
+        reproduce(STUDY, STUDY.figures, tmp_path, lambda text, done: None)
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_the_same_figures_or_more_replace_a_report(tmp_path):
+    whole = of_figures(1, 2, 3)
+    for count in (1, 1, 3):
+        reproduce(whole, whole.figures[:count], tmp_path, lambda text, done: None)
+    assert len(json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))) == 9
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A source that leaves a file, or is interrupted over it."""
+
+    is_interrupted: bool
+    size: float = 1.0
+
+    def make(self, name, folder, progress):
+        progress(f"flying {name}", 0.5)
+        if self.is_interrupted:
+            raise KeyboardInterrupt
+        (folder / "flights").mkdir(exist_ok=True)
+        (folder / "flights" / f"{name}.mcap").write_text("whole")
+
+
+def test_ctrl_c_says_what_is_finished_and_what_is_not(groundstation, monkeypatch, tmp_path):
+    row = replace(ROW, needs=("one", "two"))
+    study = replace(STUDY, sources={"one": Kept(False), "two": Kept(True)}, figures=(row,))
+    monkeypatch.setattr(table, "entry_points", lambda group: [Point(study)])
+    result = groundstation("reproduce", "made", "--out", tmp_path / "new")
+    words = result.stderr
+    assert result.exit_code == 130
+    assert f"interrupted while flying two: finished in {tmp_path / 'new'}: flights/one.mcap; report" in words
+    assert words.endswith("report.html and results.json were not written.\n")
+    fresh = replace(study, sources={"one": Kept(True), "two": Kept(True)})
+    with pytest.raises(StudyInterrupted, match="while flying one: nothing was finished in"):
+        reproduce(fresh, fresh.figures, tmp_path / "new", lambda text, done: None)
+    done = replace(study, sources={"one": Kept(False), "two": Kept(False)})
+    reproduce(done, done.figures, tmp_path / "new", lambda text, done: None)
+    with pytest.raises(StudyInterrupted, match="those that are there are of an earlier run"):
+        reproduce(study, study.figures, tmp_path / "new", lambda text, done: None)
+
+
+def test_a_flight_that_is_interrupted_leaves_what_was_there(monkeypatch, tmp_path):
+    row = next(source for source in AIR_TABLE.sources.values() if isinstance(source, FlightRow))
+    (tmp_path / "flights").mkdir()
+    (tmp_path / "flights" / "x_published.mcap").write_text("before")
+
+    def stop(text, share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        row.make("x", tmp_path, stop)
+    assert [path.name for path in (tmp_path / "flights").iterdir()] == ["x_published.mcap"]
+    assert (tmp_path / "flights" / "x_published.mcap").read_text() == "before"
