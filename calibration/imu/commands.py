@@ -161,7 +161,8 @@ def joint(
     from calibration.table.procedure import map_of_sources  # half of what is loaded, for one option
     from calibration.table.smoothed_flights import read_source
 
-    check_targets(out, plot, table_map, sources=inputs_of(source))
+    grid = None if table_map is None else table_map.with_suffix(".npz")
+    check_targets(out, plot, table_map, grid, sources=inputs_of(source))
     data = read_flight(source, vehicle)
     with refusing(source, data.notes):
         made = None if table_map is None else map_of_sources([read_source(source, None, vehicle)])[1]

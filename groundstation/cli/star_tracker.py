@@ -18,12 +18,12 @@ from groundstation.cli.plot_option import Plot
 from groundstation.cli.progress import with_progress
 from groundstation.cli.star_options import SkyOptions
 from groundstation.cli.star_pictures import PictureFolder
-from groundstation.data_sets.inputs import inputs_of
+from groundstation.data_sets.inputs import FRAMES, inputs_of
 from groundstation.data_sets.star_folder import DamagedPicture, find_frames, load_sky, read_frame
 from groundstation.declarations.errors import UsageError
 from groundstation.files.number_tables import csv_text
 from groundstation.files.png import png_of
-from groundstation.files.writing import Content, check_targets, whole_folder, write_files
+from groundstation.files.writing import Content, check_folder, check_targets, whole_folder, write_files
 from groundstation.star_tracking.answer_figure import Answers, draw_answers
 from groundstation.star_tracking.camera_model import CameraCalibration
 from groundstation.star_tracking.fixes import NoFix, PictureFix, Refusal
@@ -119,6 +119,8 @@ def solve(
     """
     cv2.setNumThreads(1)
     check_targets(out, plot, sources=inputs_of(folder))
+    if pictures is not None:
+        check_folder(pictures, sources=[folder / FRAMES])
     added = {"uses_tree": tree, "drops_thin": drop_thin, "only_similar": only_similar, "takes_median": median}
     options = SkyOptions(method, image, identification, level, angle_limit_deg, closeness_mm, added)
     options.check()

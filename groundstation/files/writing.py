@@ -58,12 +58,15 @@ def _is_read(path: Path, source: Path) -> bool:
     return _is_same(path, source) or (source.is_dir() and _is_same(path.parent, source) and path.exists())
 
 
-def check_folder(path: Path) -> None:
+def check_folder(path: Path, sources: Iterable[Path] = ()) -> None:
     """Refuse a folder that cannot be made or written in, before any work is done; its parents are made, too.
 
     Raises:
-        FileError: Something of its path is no folder, is not ours to write in, or is too long.
+        FileError: Something of its path is no folder, is not ours to write in, or is too long, or it is one
+            of the sources.
     """
+    if any(_is_same(path, source) for source in sources):
+        raise FileError(f"{path}: is a folder that is read: give what is written another name.")
     try:
         there = next((each for each in (path, *path.parents) if each.exists()), path)
     except OSError as error:

@@ -17,6 +17,7 @@ READ = [
     "star-tracker solve set --out set/camera.json",
     "star-tracker solve set --out set/frames/1.png",
     "star-tracker solve set --out a.csv --plot set/frames/1.png",
+    "star-tracker solve set --out a.csv --pictures set/frames",
     "star-tracker overhead set --out set/mock_ups.toml",
     "star-tracker survey set --out set/anchors.csv",
     "star-tracker survey set --out sky.csv --camera-out set/camera.json",
@@ -31,6 +32,7 @@ READ = [
     "calibrate allan a.mcap --out a.mcap",
     "calibrate joint set --out a.toml --table-map set/imu.csv",
     "calibrate joint set --out a.toml --table-map a.toml",
+    "calibrate joint set --out a.npz --table-map a.toml",
     "calibrate tilt a.mcap b.mcap --out b.mcap",
     "calibrate tilt a.mcap --tilts tilts.csv --out tilts.csv",
     "calibrate tilt a.mcap --table-map map.toml --out map.toml",
@@ -58,7 +60,9 @@ def test_nothing_is_written_over_what_is_read_nor_twice(groundstation, tmp_path,
     for name in FILES:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(b"never looked at")
-    with pytest.raises(FileError, match=r"is a file that is read: give|is to be written twice: give"):
+    with pytest.raises(
+        FileError, match=r"is a (file|folder) that is read: give|is to be written twice: give"
+    ):
         groundstation(*words.split())
     assert sorted(
         str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -240,3 +241,50 @@ def test_nothing_is_written_over_what_is_read_nor_twice(call, small, tmp_path, m
     with pytest.raises(FileError, match=r"is a file that is read: give|is to be written twice: give"):
         call(*words)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+SPOILT = {
+    "empty": b"",
+    "words": b"plain words, no more\n",
+    "binary": bytes(range(256)) * 4,
+    "workbook": b"PK\x03\x04" + bytes(60),
+    "array": b"\x93NUMPY\x01\x00" + bytes(60),
+    "json of something else": b'{"a": 1}',
+    "list": b"[1, 2",
+    "latin": "Gr\xf6\xdfe\n".encode("latin-1"),
+}
+
+
+@pytest.mark.parametrize("spoilt", SPOILT)
+@pytest.mark.parametrize(
+    "words",
+    [
+        "track SPOILT.json --pixels pixels.csv --out out.csv",
+        "track SPOILT.toml --pixels pixels.csv --out out.csv",
+        "track case.json --pixels SPOILT.csv --out out.csv",
+        "track case.json --video SPOILT.npz --out out.csv",
+        "track case.json --video SPOILT.avi --out out.csv",
+        "centroids SPOILT.npz --out out.csv",
+        "spin SPOILT.json --pixels runs.csv --out out.csv",
+        "spin stage.json --pixels SPOILT.csv --out out.csv",
+        "target SPOILT.png --out out.html",
+        "tle SPOILT.txt --out out.csv",
+        "tle SPOILT.txt SPOILT.txt --out out.csv",
+    ],
+)
+def test_whatever_a_file_holds_it_is_named_once_in_one_sentence(
+    call, small, tmp_path, monkeypatch, words, spoilt
+):
+    monkeypatch.chdir(tmp_path)
+    _stage_and_runs(tmp_path)
+    (spoilt_name,) = {word for word in words.split() if word.startswith("SPOILT")}
+    (tmp_path / spoilt_name).write_bytes(SPOILT[spoilt])
+    with pytest.raises(FileError) as refused:
+        call(*words.split())
+    sentence = str(refused.value)
+    assert sentence.count(spoilt_name) == 1
+    assert sentence.startswith(f"{spoilt_name}: ")
+    assert re.search(r"[^.)]\.$|[^.]\)\.$", sentence)
+    assert ".)." not in sentence
+    assert "pickle" not in sentence
+    assert not list(tmp_path.glob("out.*"))
