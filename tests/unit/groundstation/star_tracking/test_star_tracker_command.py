@@ -67,7 +67,7 @@ def test_refused_frames_are_drawn_or_all_of_them(call, ceiling_folder, tmp_path)
         assert cv2.imread(str(folder / "00002.png")).shape[1] == 2 * 640
     with pytest.raises(UsageError, match="--pictures"):
         call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--every-picture")
-    with pytest.raises(FileError, match="a file is in its place"):
+    with pytest.raises(FileError, match="no such folder can be made"):
         call("solve", ceiling_folder, "--out", tmp_path / "a.csv", "--pictures", tmp_path / "a.csv")
 
 
