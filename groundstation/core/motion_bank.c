@@ -143,7 +143,8 @@ static void sandwich(const double *F, const double *P, double *Q)
 
 void gs_bank_predict(const Span *span, int64_t m, double *states, double *covariance, const double *densities)
 {
-    double rates[3 * MOST_MEMBERS], up[3 * MOST_MEMBERS], normal[3 * MOST_MEMBERS], after[3 * MOST_MEMBERS];
+    double rates[3 * MOST_MEMBERS] = {0.0}, up[3 * MOST_MEMBERS] = {0.0}, normal[3 * MOST_MEMBERS] = {0.0};
+    double after[3 * MOST_MEMBERS];
     double turns[9 * MOST_MEMBERS], angle_by_rate[9 * MOST_MEMBERS], rate_by_rate[9 * MOST_MEMBERS];
     const double *inertia = span->has_inertia ? span->inertia : NULL;
     const int has_vertical = inertia && span->orbital_rate > 0.0;
