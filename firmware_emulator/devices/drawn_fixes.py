@@ -16,7 +16,8 @@ from firmware_emulator.device_kind import DeviceKind
 from firmware_emulator.devices.camera_settings import CameraConfig
 from firmware_emulator.devices.pending import take_until
 from firmware_emulator.devices.repeated_pictures import RepeatedPictures
-from firmware_emulator.devices.star_camera import Pose, displaced
+from firmware_emulator.devices.shutter import Pose
+from firmware_emulator.devices.star_camera import displaced
 from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S

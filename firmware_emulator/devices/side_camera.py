@@ -1,25 +1,18 @@
 """The camera on a hull that looks at the other mock-ups: when it exposes, where all are meanwhile."""
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from drivers.laboratory import ChannelKind
 from firmware_emulator.device_kind import DeviceKind, PictureOrder
-from firmware_emulator.devices.pending import take_until
-from firmware_emulator.devices.star_camera import Pose
+from firmware_emulator.devices.shutter import PictureSettings, Pose, Shutter, pose_of
 from firmware_emulator.failure_kinds import FailureKind, Parameter
 from firmware_emulator.failures import Failures
 from firmware_emulator.plant.rigid_body import Vehicle
-from firmware_emulator.plant.thrusters import NS_PER_S
 from firmware_emulator.scenario import MockUp, Scenario, Site
-from firmware_emulator.settings import NonNegative, Positive, Settings
-
-_JITTER_LIMIT = 6.0  # standard deviations
+from firmware_emulator.settings import Positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +38,7 @@ class SideExposure:
     arrival_ns: int
 
 
-class SideCameraConfig(Settings):
+class SideCameraConfig(PictureSettings):
     """The section `side_camera` of a mock-up: a camera on its hull that looks along the table."""
 
     camera: str
@@ -54,23 +47,13 @@ class SideCameraConfig(Settings):
     """Path of what every mock-up looks like from the side (TOML)."""
     rate_hz: Positive = 15.0
     exposure_s: Positive = 0.004
-    delay_s: Annotated[float, Field(ge=0.0, le=4.0)] = 0.02
-    """From the middle of the exposure to the host."""
-    delay_jitter_s: NonNegative = 0.001
-    stream: Literal["raw", "mjpeg"] = "raw"
-    """How live pictures are served over HTTP."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
-
-    @model_validator(mode="after")
-    def _exposure_fits_the_rate(self) -> "SideCameraConfig":
-        if self.exposure_s * self.rate_hz >= 1.0:
-            raise ValueError(
-                f"exposure_s = {self.exposure_s:g} s is longer than a period of rate_hz = {self.rate_hz:g}"
-            )
-        return self
 
 
-class SideCamera:
+Places = tuple[Pose, dict[str, Pose]]
+"""Of who carries the camera, and of the others by name."""
+
+
+class SideCamera(Shutter[Places, SideExposure]):
     """Timing of the exposures, and what moves during each.
 
     Args:
@@ -91,45 +74,14 @@ class SideCamera:
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
+        timing = settings.rate_hz, settings.exposure_s, settings.delay_s, settings.delay_jitter_s
+        super().__init__(*timing, rng, start_ns, 1.0 / 3.0)
         self._carrier, self._others, self._failures = carrier, dict(others), failures
-        self._period_ns = round(NS_PER_S / settings.rate_hz)
-        self._open_ns = round(settings.exposure_s * NS_PER_S)
-        self._delay_ns = round(settings.delay_s * NS_PER_S)
-        self._jitter_ns = settings.delay_jitter_s * NS_PER_S
-        self._rng, self._start_ns = rng, start_ns
-        self._opens_ns = start_ns + self._period_ns // 3
-        self._starts: tuple[Pose, dict[str, Pose]] | None = None
         self._frozen: SideExposure | None = None
-        self._sequence = 0
-        self._last_arrival_ns = 0
-        self._pending: deque[tuple[int, SideExposure]] = deque()
 
-    @property
-    def next_ns(self) -> int:
-        """When the shutter next moves."""
-        return self._opens_ns if self._starts is None else self._opens_ns + self._open_ns
-
-    @property
-    def next_output_ns(self) -> int:
-        """When the next picture may reach the host."""
-        if self._pending:
-            return self._pending[0][0]
-        early_ns = self._opens_ns + self._open_ns // 2 + self._delay_ns
-        return max(self._opens_ns + self._open_ns, early_ns - round(_JITTER_LIMIT * self._jitter_ns))
-
-    def run(self, now_ns: int) -> None:
-        """Open or close the shutter."""
-        if self._starts is None:
-            self._starts = self._poses(now_ns)
-            return
-        (own, others), (own_end, ends) = self._starts, self._poses(now_ns)
-        self._starts = None
-        middle_ns = self._opens_ns + self._open_ns // 2
-        self._opens_ns += self._period_ns
-        jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
-        arrival_ns = max(now_ns, middle_ns + self._delay_ns + round(jitter * self._jitter_ns))
-        self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
-        age_ns = middle_ns - self._start_ns
+    def _exposed(self, before: Places, after: Places, middle_ns: int, age_ns: int) -> SideExposure | None:
+        del middle_ns
+        (own, others), (own_end, ends) = before, after
         covered = self._failures.active("covered_side_camera", age_ns)
         seen = SideExposure(
             self._sequence,
@@ -140,35 +92,17 @@ class SideCamera:
             covered.parameters["share"] if covered else 0.0,
             self._last_arrival_ns,
         )
-        self._sequence += 1
         if self._failures.active("frozen_side_camera", age_ns) is None:
             self._frozen = None
         elif self._frozen is None:
             self._frozen = seen
         if self._frozen is not None:
             seen = replace(self._frozen, sequence=seen.sequence, arrival_ns=seen.arrival_ns)
-        if self._failures.active("silent_side_camera", age_ns) is None:
-            self._pending.append((seen.arrival_ns, seen))
+        return seen if self._failures.active("silent_side_camera", age_ns) is None else None
 
-    def take(self, until_ns: int) -> list[tuple[int, SideExposure]]:
-        """Exposures whose pictures reached the host up to `until_ns`."""
-        return take_until(self._pending, until_ns)
-
-    def take_exposed(self) -> list[SideExposure]:
-        """Exposures taken so far, ahead of their arrival: for one who draws them elsewhere."""
-        taken = [exposure for _, exposure in self._pending]
-        self._pending.clear()
-        return taken
-
-    def _poses(self, now_ns: int) -> tuple[Pose, dict[str, Pose]]:
-        return _pose(self._carrier, now_ns), {
-            name: _pose(vehicle, now_ns) for name, vehicle in self._others.items()
-        }
-
-
-def _pose(vehicle: Vehicle, now_ns: int) -> Pose:
-    motion = vehicle.origin_at(now_ns)
-    return motion.x_m, motion.y_m, motion.heading_rad
+    def _places(self, now_ns: int) -> Places:
+        others = {name: pose_of(vehicle, now_ns) for name, vehicle in self._others.items()}
+        return pose_of(self._carrier, now_ns), others
 
 
 def build(site: Site, mock_up: MockUp, settings: SideCameraConfig) -> SideCamera:

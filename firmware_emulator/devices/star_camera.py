@@ -5,7 +5,6 @@ drawn at once (lockstep) or by another process (live).
 """
 
 import math
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -14,18 +13,13 @@ import numpy as np
 from drivers.laboratory import ChannelKind
 from firmware_emulator.device_kind import DeviceKind, PictureOrder
 from firmware_emulator.devices.camera_settings import CameraConfig
-from firmware_emulator.devices.pending import take_until
 from firmware_emulator.devices.repeated_pictures import RepeatedPictures
+from firmware_emulator.devices.shutter import Pose, Shutter, pose_of
 from firmware_emulator.failures import Failures
-from firmware_emulator.plant.motion_state import Motion
 from firmware_emulator.plant.rigid_body import Vehicle
 from firmware_emulator.plant.thrusters import NS_PER_S
 from firmware_emulator.scenario import MockUp, Scenario
 from firmware_emulator.sky.sky import SkyFailures
-
-Pose = tuple[float, float, float]
-"""x, y (m) and heading (rad) of the body origin in the table frame."""
-_JITTER_LIMIT = 6.0  # standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +51,7 @@ class Exposure:
     lower: "Exposure | None" = None
 
 
-class StarCamera:
+class StarCamera(Shutter[Pose, Exposure]):
     """Timing and place of one camera's exposures.
 
     Args:
@@ -84,64 +78,26 @@ class StarCamera:
         rng: np.random.Generator,
         start_ns: int,
     ) -> None:
-        self._vehicle = vehicle
-        self._period_ns = round(NS_PER_S / rate_hz)
-        self._open_ns = round((exposure_s + readout_s) * NS_PER_S)
-        self._delay_ns = round(delay_s * NS_PER_S)
-        self._jitter_ns = delay_jitter_s * NS_PER_S
-        self._failures, self._rng, self._start_ns = failures, rng, start_ns
-        self._opens_ns = start_ns + self._period_ns
-        self._start: Motion | None = None
+        super().__init__(rate_hz, exposure_s + readout_s, delay_s, delay_jitter_s, rng, start_ns, 1.0)
+        self._vehicle, self._failures = vehicle, failures
         self._repeated: RepeatedPictures[Exposure] = RepeatedPictures(failures)
-        self._before: Exposure | None = None
-        self._sequence = 0
-        self._last_arrival_ns = 0
-        self._pending: deque[tuple[int, Exposure]] = deque()
+        self._upper: Exposure | None = None
 
-    @property
-    def next_ns(self) -> int:
-        """When the shutter next moves."""
-        return self._opens_ns if self._start is None else self._opens_ns + self._open_ns
+    def _places(self, now_ns: int) -> Pose:
+        return pose_of(self._vehicle, now_ns)
 
-    @property
-    def next_output_ns(self) -> int:
-        """When the next picture may reach the host."""
-        if self._pending:
-            return self._pending[0][0]
-        middle_ns = self._opens_ns + self._open_ns // 2
-        early_ns = middle_ns + self._delay_ns - round(_JITTER_LIMIT * self._jitter_ns)
-        return max(self._opens_ns + self._open_ns, early_ns)
-
-    def run(self, now_ns: int) -> None:
-        """Open or close the shutter."""
-        if self._start is None:
-            self._start = self._vehicle.origin_at(now_ns)
-            return
-        start, end = self._start, self._vehicle.origin_at(now_ns)
-        self._start = None
-        middle_ns = self._opens_ns + self._open_ns // 2
-        self._opens_ns += self._period_ns
-        age_ns = middle_ns - self._start_ns
-        jitter = float(np.clip(self._rng.standard_normal(), -_JITTER_LIMIT, _JITTER_LIMIT))
+    def _held_up_ns(self, age_ns: int) -> int:
         slow = self._failures.active("slow_camera", age_ns)
-        late_ns = self._delay_ns + (round(slow.parameters["delay_s"] * NS_PER_S) if slow else 0)
-        arrival_ns = max(now_ns, middle_ns + late_ns + round(jitter * self._jitter_ns))
-        self._last_arrival_ns = max(self._last_arrival_ns + 1, arrival_ns)
-        is_skipped = slow is not None and self._sequence % int(slow.parameters["keep_one_in"]) != 0
-        exposure = self._exposed(_pose(start), _pose(end), middle_ns, age_ns)
-        self._sequence += 1
-        if not (is_skipped or self._failures.active("silent_camera", age_ns)):
-            self._pending.append((exposure.arrival_ns, exposure))
+        return round(slow.parameters["delay_s"] * NS_PER_S) if slow else 0
 
-    def _exposed(self, start: Pose, end: Pose, middle_ns: int, age_ns: int) -> Exposure:
-        """What is sent of the exposure between two poses."""
+    def _exposed(self, before: Pose, after: Pose, middle_ns: int, age_ns: int) -> Exposure | None:
         for wrong in self._failures.all_active("wrong_fixes", age_ns):
-            start, end = displaced(start, wrong.parameters), displaced(end, wrong.parameters)
+            before, after = displaced(before, wrong.parameters), displaced(after, wrong.parameters)
         false_lights = self._failures.active("false_lights", age_ns)
         seen = Exposure(
             self._sequence,
-            start,
-            end,
+            before,
+            after,
             middle_ns,
             self._last_arrival_ns,
             self._failures.active("dead_sky", age_ns) is not None,
@@ -150,8 +106,12 @@ class StarCamera:
             noise=self._sequence,
         )
         is_torn = self._failures.active("torn_camera", age_ns) is not None
-        before, self._before = self._before, seen
-        shown = self._repeated.shown(replace(seen, lower=before) if is_torn else seen, age_ns)
+        upper, self._upper = self._upper, seen
+        shown = self._repeated.shown(replace(seen, lower=upper) if is_torn else seen, age_ns)
+        slow = self._failures.active("slow_camera", age_ns)
+        is_skipped = slow is not None and self._sequence % int(slow.parameters["keep_one_in"]) != 0
+        if is_skipped or self._failures.active("silent_camera", age_ns):
+            return None
         return replace(shown, sequence=seen.sequence, middle_ns=seen.middle_ns, arrival_ns=seen.arrival_ns)
 
     def _sky_failures(self, age_ns: int) -> SkyFailures | None:
@@ -166,20 +126,6 @@ class StarCamera:
             tuple((int(row["star"]), row["dx_m"], row["dy_m"]) for row in moved),
             tuple((row["x_m"], row["y_m"]) for row in new),
         )
-
-    def take(self, until_ns: int) -> list[tuple[int, Exposure]]:
-        """Exposures whose pictures reached the host up to `until_ns`."""
-        return take_until(self._pending, until_ns)
-
-    def take_exposed(self) -> list[Exposure]:
-        """Exposures taken so far, ahead of their arrival: for one who draws them elsewhere."""
-        taken = [exposure for _, exposure in self._pending]
-        self._pending.clear()
-        return taken
-
-
-def _pose(motion: Motion) -> Pose:
-    return motion.x_m, motion.y_m, motion.heading_rad
 
 
 def displaced(pose: Pose, by: Mapping[str, float]) -> Pose:
