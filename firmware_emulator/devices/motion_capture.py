@@ -20,8 +20,8 @@ from firmware_emulator.devices.pending import take_until
 from firmware_emulator.devices.quaternions import Quaternion, Triple, about_z, inverse, small, times, turned
 from firmware_emulator.failures import NS_PER_S, FailureKind
 from firmware_emulator.scenario import MockUp, Site
+from firmware_emulator.scene_files import SceneError
 from firmware_emulator.settings import NonNegative, Positive, Settings
-from firmware_emulator.sky.scene import SceneError
 
 _JITTER_LIMIT = 6.0  # standard deviations
 _HALF_ROOT = math.sqrt(0.5)

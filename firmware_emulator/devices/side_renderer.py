@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_emulator.devices.side_camera import SideExposure
+from firmware_emulator.scene_files import SceneError
 from firmware_emulator.side_view.scene import read_hulls, read_side_camera
 from firmware_emulator.side_view.side_view import SideView, SunLamp
-from firmware_emulator.sky.scene import SceneError
 
 
 class SideRenderer:

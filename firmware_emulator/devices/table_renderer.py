@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from firmware_emulator.devices.overhead_camera import TableExposure
 from firmware_emulator.overhead.scene import read_markings, read_overhead_camera
 from firmware_emulator.overhead.table_view import Body, Light, TableView
-from firmware_emulator.sky.scene import SceneError
+from firmware_emulator.scene_files import SceneError
 
 
 class TableRenderer:

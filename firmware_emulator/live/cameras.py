@@ -12,7 +12,7 @@ from typing import Any
 
 from firmware_emulator.device_kind import PictureOrder
 from firmware_emulator.live.tcp_server import LOOPBACK
-from firmware_emulator.sky.scene import SceneError
+from firmware_emulator.scene_files import SceneError
 
 _GRACE_S = 0.5
 _BACK_OFF_S = 2.0

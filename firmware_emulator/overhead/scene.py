@@ -1,15 +1,12 @@
 """Files of the camera over the table and of the circles on the mock-ups, as the emulator reads them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.files.reading import read_bytes
-from drivers.files.trees import parse_json, parse_toml
 from firmware_emulator.overhead.optics import OverheadOptics
-from firmware_emulator.sky.scene import SceneError, is_number
-
-_NUMBERS = {"dist_k1_k2_p1_p2_k3": 5, "position_table_m": 3}
+from firmware_emulator.scene_files import CameraFile, read_tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,36 +33,23 @@ def read_overhead_camera(path: Path) -> OverheadOptics:
     Raises:
         FileError: The file is missing, or a key is missing or holds something else than its number.
     """
-    data = parse_json(read_bytes(path), path)
+    return CameraFile(path).makes(_optics)
 
-    def numbers(key: str) -> tuple[float, ...]:
-        value = data.get(key)
-        values = value if isinstance(value, list) else [value]
-        found = [float(item) for item in values if is_number(item)]
-        if not len(found) == len(values) == _NUMBERS.get(key, 1):
-            raise SceneError(
-                f"{path}: key {key!r} must hold {_NUMBERS.get(key, 1)} numbers, found {value!r:.80}"
-            )
-        return tuple(found)
 
-    k1, k2, p1, p2, k3 = numbers("dist_k1_k2_p1_p2_k3")
-    x, y, z = numbers("position_table_m")
-    try:
-        return OverheadOptics(
-            width_px=int(numbers("width")[0]),
-            height_px=int(numbers("height")[0]),
-            focal_px=(numbers("fx")[0], numbers("fy")[0]),
-            centre_px=(numbers("cx")[0], numbers("cy")[0]),
-            distortion=(k1, k2, p1, p2, k3),
-            position_m=(x, y, z),
-            yaw_rad=numbers("yaw_rad")[0],
-            tilt_x_rad=numbers("tilt_x_rad")[0],
-            tilt_y_rad=numbers("tilt_y_rad")[0],
-        )
-    except SceneError:
-        raise
-    except ValueError as error:
-        raise SceneError(f"{path}: {error}") from error
+def _optics(file: CameraFile) -> OverheadOptics:
+    k1, k2, p1, p2, k3 = file.numbers("dist_k1_k2_p1_p2_k3", 5)
+    x_m, y_m, z_m = file.numbers("position_table_m", 3)
+    return OverheadOptics(
+        width_px=int(file.number("width")),
+        height_px=int(file.number("height")),
+        focal_px=(file.number("fx"), file.number("fy")),
+        centre_px=(file.number("cx"), file.number("cy")),
+        distortion=(k1, k2, p1, p2, k3),
+        position_m=(x_m, y_m, z_m),
+        yaw_rad=file.number("yaw_rad"),
+        tilt_x_rad=file.number("tilt_x_rad"),
+        tilt_y_rad=file.number("tilt_y_rad"),
+    )
 
 
 def read_markings(path: Path) -> dict[str, Markings]:
@@ -74,15 +58,9 @@ def read_markings(path: Path) -> dict[str, Markings]:
     Raises:
         FileError: The file is missing or is not of that form.
     """
-    data = parse_toml(read_bytes(path), path)
-    try:
-        return {name: _markings(table) for name, table in data.items()}
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SceneError(
-            f"{path}: expected tables with height_m, radius_m and circles: {error!r:.200}"
-        ) from error
+    return read_tables(path, _markings, "height_m, radius_m and circles")
 
 
-def _markings(table: dict[str, Any]) -> Markings:
+def _markings(table: Mapping[str, Any]) -> Markings:
     discs = tuple(Disc(str(row["colour"]), float(row["x_m"]), float(row["y_m"])) for row in table["circles"])
     return Markings(float(table["height_m"]), float(table["radius_m"]), discs)

@@ -1,16 +1,14 @@
 """Files of the side camera and of the hulls that it sees, as the emulator reads them."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.files.reading import read_bytes
-from drivers.files.trees import parse_json, parse_toml
-from firmware_emulator.sky.scene import SceneError, is_number
+from firmware_emulator.scene_files import CameraFile, is_number, read_tables
 
 _MOST_PX, _FARTHEST_M, _MOST_RAD = 1e5, 100.0, 7.0
-_COUNTS = {"position_body_m": 3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,32 +87,19 @@ def read_side_camera(path: Path) -> SideOptics:
     Raises:
         FileError: The file is missing, or a key is missing or holds something else than its number.
     """
-    data = parse_json(read_bytes(path), path)
+    return CameraFile(path).makes(_optics)
 
-    def numbers(key: str) -> tuple[float, ...]:
-        value = data.get(key)
-        values = value if isinstance(value, list) else [value]
-        found = tuple(float(item) for item in values if is_number(item))
-        if not len(found) == len(values) == _COUNTS.get(key, 1):
-            raise SceneError(
-                f"{path}: key {key!r} must hold {_COUNTS.get(key, 1)} numbers, found {value!r:.80}"
-            )
-        return found
 
-    x_m, y_m, z_m = numbers("position_body_m")
-    try:
-        return SideOptics(
-            width_px=int(numbers("width")[0]),
-            height_px=int(numbers("height")[0]),
-            focal_px=numbers("f_px")[0],
-            centre_px=(numbers("cx")[0], numbers("cy")[0]),
-            position_body_m=(x_m, y_m, z_m),
-            yaw_rad=numbers("yaw_rad")[0],
-        )
-    except SceneError:
-        raise
-    except ValueError as error:
-        raise SceneError(f"{path}: {error}") from error
+def _optics(file: CameraFile) -> SideOptics:
+    x_m, y_m, z_m = file.numbers("position_body_m", 3)
+    return SideOptics(
+        width_px=int(file.number("width")),
+        height_px=int(file.number("height")),
+        focal_px=file.number("f_px"),
+        centre_px=(file.number("cx"), file.number("cy")),
+        position_body_m=(x_m, y_m, z_m),
+        yaw_rad=file.number("yaw_rad"),
+    )
 
 
 def read_hulls(path: Path) -> dict[str, Hull]:
@@ -123,16 +108,10 @@ def read_hulls(path: Path) -> dict[str, Hull]:
     Raises:
         FileError: The file is missing or is not of that form.
     """
-    data = parse_toml(read_bytes(path), path)
-    try:
-        return {name: _hull(table) for name, table in data.items()}
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SceneError(
-            f"{path}: expected tables with radius_m, bottom_m, top_m and markers: {error!r:.200}"
-        ) from error
+    return read_tables(path, _hull, "radius_m, bottom_m, top_m and markers")
 
 
-def _hull(table: dict[str, Any]) -> Hull:
+def _hull(table: Mapping[str, Any]) -> Hull:
     rows = table.get("markers", [])
     markers = tuple(Marker(math.radians(_finite(row["azimuth_deg"])), _finite(row["z_m"])) for row in rows)
     radius_m, bottom_m, top_m = (_finite(table[key]) for key in ("radius_m", "bottom_m", "top_m"))

@@ -1,16 +1,12 @@
 """Files of an emulated ceiling and camera, and a sky made of them."""
 
-import math
 from pathlib import Path
-from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.files.errors import FileError
 from drivers.files.number_tables import load_table
-from drivers.files.reading import read_bytes
-from drivers.files.trees import parse_json
+from firmware_emulator.scene_files import CameraFile
 from firmware_emulator.sky.optics import CameraOptics
 from firmware_emulator.sky.sky import Glow, Sky
 
@@ -21,10 +17,6 @@ _GLOW_BRIGHTNESS = (1.5, 7.0)
 
 
 _FARTHEST_M = 100.0  # no ceiling reaches so far: beyond it the list is in millimetres
-
-
-class SceneError(FileError):
-    """A camera file cannot be used; the message names file, place and what was expected."""
 
 
 def read_ceiling(path: Path) -> NDArray[np.float64]:
@@ -42,38 +34,24 @@ def read_camera(path: Path) -> CameraOptics:
     Raises:
         FileError: The file is missing, or a key is missing or holds something else than its number.
     """
-    data = parse_json(read_bytes(path), path)
+    return CameraFile(path).makes(_optics)
 
-    def numbers(key: str, count: int) -> tuple[float, ...]:
-        found = data.get(key)
-        values = found if isinstance(found, list) else [found]
-        if len(values) != count or not all(map(is_number, values)):
-            wanted = "a finite number" if count == 1 else f"a list of {count} finite numbers"
-            raise SceneError(f"{path}: key {key!r} must be {wanted}, found {found!r:.80}")
-        return tuple(map(float, values))
 
-    def number(key: str) -> float:
-        return numbers(key, 1)[0]
-
-    k1, k2, p1, p2, k3 = numbers("dist_k1_k2_p1_p2_k3", 5)
-    offset = numbers("mount_offset_body_m", 3)
-    try:
-        return CameraOptics(
-            width_px=int(number("width")),
-            height_px=int(number("height")),
-            focal_px=(number("fx"), number("fy")),
-            centre_px=(number("cx"), number("cy")),
-            distortion=(k1, k2, p1, p2, k3),
-            ceiling_height_m=number("ceiling_height_above_camera_m"),
-            offset_body_m=(offset[0], offset[1]),
-            yaw_rad=number("mount_yaw_rad"),
-            tilt_x_rad=number("mount_tilt_x_rad"),
-            tilt_y_rad=number("mount_tilt_y_rad"),
-        )
-    except SceneError:
-        raise
-    except ValueError as error:
-        raise SceneError(f"{path}: {error}") from error
+def _optics(file: CameraFile) -> CameraOptics:
+    k1, k2, p1, p2, k3 = file.numbers("dist_k1_k2_p1_p2_k3", 5)
+    x_m, y_m, _ = file.numbers("mount_offset_body_m", 3)
+    return CameraOptics(
+        width_px=int(file.number("width")),
+        height_px=int(file.number("height")),
+        focal_px=(file.number("fx"), file.number("fy")),
+        centre_px=(file.number("cx"), file.number("cy")),
+        distortion=(k1, k2, p1, p2, k3),
+        ceiling_height_m=file.number("ceiling_height_above_camera_m"),
+        offset_body_m=(x_m, y_m),
+        yaw_rad=file.number("mount_yaw_rad"),
+        tilt_x_rad=file.number("mount_tilt_x_rad"),
+        tilt_y_rad=file.number("mount_tilt_y_rad"),
+    )
 
 
 def build_sky(ceiling_xy_m: NDArray[np.float64], seed: np.random.SeedSequence) -> Sky:
@@ -89,13 +67,3 @@ def build_sky(ceiling_xy_m: NDArray[np.float64], seed: np.random.SeedSequence) -
         Glow(x_m, y_m, rng.uniform(*_GLOW_RADIUS_M), rng.uniform(*_GLOW_BRIGHTNESS)) for x_m, y_m in middles_m
     ]
     return Sky(ceiling_xy_m, brightness, rng, glows)
-
-
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a finite number, not a whole one of hundreds of digits."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False

@@ -43,12 +43,15 @@ def read_frames(path: Path) -> NDArray[np.uint8]:
     return np.asarray(frames, dtype=np.uint8)
 
 
+_SPOILT = (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+
+
 def _frames(data: bytes, path: Path) -> NDArray[np.generic]:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             names: list[str] = archive.files
             frames: NDArray[np.generic] | None = archive[KEY] if KEY in names else None
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+    except _SPOILT as error:  # an archive of anybody: each is a spoilt one, of a kind of its own
         raise FileError(f"{path}: is a damaged .npz, or holds objects: {_HINT}.") from error
     if frames is None:
         raise FileError(f"{path}: holds no array '{KEY}' ({', '.join(names) or 'nothing'}): {_HINT}.")

@@ -3,15 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
+from pathlib import Path
+from typing import Any, TypeVar
 
 from drivers.files.trees import parse_toml, toml_of
+from groundstation.files.errors import FileError
 
-__all__ = ["parse_toml", "toml_lines", "toml_of", "toml_table", "toml_value"]
+__all__ = ["made_of_tables", "parse_toml", "toml_lines", "toml_of", "toml_table", "toml_value"]
 
+Made = TypeVar("Made")
 Scalar = float | int | str | bool | datetime
 Value = Scalar | Sequence["Value"]
+
+
+def made_of_tables(data: bytes, path: Path, make: Callable[[dict[str, Any]], Made]) -> Made:
+    """Return what is made of a TOML file that has a table for each mock-up.
+
+    Args:
+        data: Content of the file.
+        path: Its name, for messages.
+        make: Raises ValueError where a table or key is missing or impossible.
+
+    Raises:
+        FileError: It is no TOML, has no table, or a key is missing or impossible.
+    """
+    found = parse_toml(data, path)
+    if not found:
+        raise FileError(f"{path}: names no mock-up; expected a table like [alpha].")
+    try:
+        return make(found)
+    except ValueError as error:
+        raise FileError(f"{path}: {error}.") from error
 
 
 def toml_value(value: Value) -> str:

@@ -1,7 +1,7 @@
 """Numbers out of JSON and TOML, refused by the name of their key."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 _MOST_SHOWN = 80
@@ -46,6 +46,22 @@ def numbers(values: Mapping[str, Any], key: str, count: int, name: str | None = 
     if not isinstance(value, list) or len(value) != count or not all(map(_is_finite, value)):
         raise ValueError(f"{name} must be a list of {count} finite numbers, found {_shown(value)}")
     return tuple(float(item) for item in value)
+
+
+def check_keys(values: Mapping[str, Any], where: str, keys: Sequence[str]) -> None:
+    """Refuse keys that nobody reads.
+
+    Args:
+        values: A table.
+        where: What messages call it.
+        keys: Those that are read.
+
+    Raises:
+        ValueError: It has another one.
+    """
+    unknown = set(values) - set(keys)
+    if unknown:
+        raise ValueError(f"'{where}.{min(unknown)}' is no known key (a typo?)")
 
 
 def check_amount(name: str, value: float, most: float, hint: str = "") -> None:

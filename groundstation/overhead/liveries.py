@@ -9,12 +9,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
-from groundstation.files.toml_file import parse_toml
-from groundstation.files.values import number
+from groundstation.files.toml_file import made_of_tables
+from groundstation.files.values import check_keys, number
 
 COLOURS = ("red", "green", "blue")
 MIN_DIFFERENCE_M = 0.02
@@ -100,21 +98,19 @@ def parse_liveries(data: bytes, path: Path) -> tuple[Livery, ...]:
     Raises:
         FileError: It is no TOML, or a key is missing or impossible.
     """
-    found = parse_toml(data, path)
-    if not found:
-        raise FileError(f"{path}: names no mock-up; expected a table like [alpha].")
-    try:
-        liveries = tuple(_livery(name, table) for name, table in found.items())
-        check_distinct(liveries)
-    except ValueError as error:
-        raise FileError(f"{path}: {error}.") from error
+    return made_of_tables(data, path, _liveries)
+
+
+def _liveries(tables: Mapping[str, object]) -> tuple[Livery, ...]:
+    liveries = tuple(_livery(name, table) for name, table in tables.items())
+    check_distinct(liveries)
     return liveries
 
 
 def _livery(name: str, table: object) -> Livery:
     if not isinstance(table, dict):
         raise ValueError(f"'{name}' must be a table with height_m, radius_m and circles")
-    _only(table, name, ("height_m", "radius_m", "circles"))
+    check_keys(table, name, ("height_m", "radius_m", "circles"))
     circles = table.get("circles")
     if not isinstance(circles, list) or len(circles) != _CIRCLES:
         raise ValueError(f"{name}.circles must be a list of three circles")
@@ -123,7 +119,7 @@ def _livery(name: str, table: object) -> Livery:
         where = f"{name}.circles.{i}"
         if not isinstance(circle, dict):
             raise ValueError(f"{where} must be a table with colour, x_m and y_m")
-        _only(circle, where, ("colour", "x_m", "y_m"))
+        check_keys(circle, where, ("colour", "x_m", "y_m"))
         try:
             x_m, y_m = (number(circle, key, f"{where}.{key}") for key in ("x_m", "y_m"))
             made.append(Circle(str(circle.get("colour")), x_m, y_m))
@@ -132,12 +128,6 @@ def _livery(name: str, table: object) -> Livery:
             raise ValueError(message if message.startswith(where) else f"{where}: {message}") from error
     height_m, radius_m = (number(table, key, f"{name}.{key}") for key in ("height_m", "radius_m"))
     return Livery(name, (made[0], made[1], made[2]), height_m, radius_m)
-
-
-def _only(table: Mapping[str, Any], where: str, keys: Sequence[str]) -> None:
-    unknown = set(table) - set(keys)
-    if unknown:
-        raise ValueError(f"'{where}.{min(unknown)}' is no known key (a typo?)")
 
 
 def _look_alike(first: Livery, second: Livery) -> bool:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import FileError
-from groundstation.files.json_file import parse_json
+from groundstation.files.json_file import made_of_json
 from groundstation.files.reading import read_bytes
 from groundstation.files.values import check_amount, number, numbers, whole_number
 from groundstation.frames import turned_axes
@@ -104,11 +103,7 @@ class OverheadCamera:
         Raises:
             FileError: It is no JSON, or a key is missing or impossible.
         """
-        found = parse_json(data, path)
-        try:
-            return cls.from_mapping({**(known or {}), **found})
-        except ValueError as error:
-            raise FileError(f"{path}: {error}.") from error
+        return made_of_json(data, path, lambda found: cls.from_mapping({**(known or {}), **found}))
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> "OverheadCamera":

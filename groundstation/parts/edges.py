@@ -1,8 +1,13 @@
 """Open devices that several parts have in common: a line of bytes, a camera."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
-from groundstation.declarations.port import READ_TIMEOUT_S, Edge
+from drivers.laboratory import CameraFrame
+from groundstation.declarations.camera_image import CameraImage
+from groundstation.declarations.message import Message
+from groundstation.declarations.port import READ_TIMEOUT_S, Edge, Port
+from groundstation.declarations.topic import Delivery
 
 STREAM_BAUD = 115200
 """For streams that a socket usually carries; sockets ignore it."""
@@ -63,3 +68,24 @@ class CameraEdge(Edge):
 
     def close(self) -> None:
         self._camera.close()
+
+
+@dataclass(frozen=True)
+class GreyCameraPort(Port):
+    """Grey pictures of a vehicle's camera as they arrive, of the class ``reads``; only the newest counts."""
+
+    delivery = Delivery.NEWEST
+
+    timeout_s: float
+
+    def to_message(self, stamp_ns: int, data: object) -> Message:
+        assert isinstance(data, CameraFrame)
+        assert issubclass(self.reads, CameraImage)
+        height, width = data.image.shape
+        device_ns = data.stamp_device_ns or 0
+        return self.reads(
+            stamp_ns, self.vehicle, device_ns, height, width, "mono8", width, data.image.tobytes()
+        )
+
+    def open(self) -> Edge:
+        return CameraEdge(str(self.address), self.timeout_s)

@@ -6,18 +6,15 @@ heights above the table; where it wears markers, ``marker_radius_m`` and ``marke
 """
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import FileError
 from groundstation.files.reading import read_bytes
-from groundstation.files.toml_file import parse_toml
-from groundstation.files.values import check_amount, number
+from groundstation.files.toml_file import made_of_tables
+from groundstation.files.values import check_amount, check_keys, number
 
 Floats = NDArray[np.float64]
 
@@ -126,19 +123,15 @@ def parse_side_bodies(data: bytes, path: Path) -> tuple[SideBody, ...]:
     Raises:
         FileError: It is no TOML, or a key is missing or impossible.
     """
-    found = parse_toml(data, path)
-    if not found:
-        raise FileError(f"{path}: names no mock-up; expected a table like [alpha].")
-    try:
-        return tuple(_body(name, table) for name, table in found.items())
-    except ValueError as error:
-        raise FileError(f"{path}: {error}.") from error
+    return made_of_tables(
+        data, path, lambda tables: tuple(_body(name, table) for name, table in tables.items())
+    )
 
 
 def _body(name: str, table: object) -> SideBody:
     if not isinstance(table, dict):
         raise ValueError(f"'{name}' must be a table with radius_m, bottom_m and top_m")
-    _only(table, name, ("radius_m", "bottom_m", "top_m", "marker_radius_m", "markers"))
+    check_keys(table, name, ("radius_m", "bottom_m", "top_m", "marker_radius_m", "markers"))
     rows = table.get("markers", [])
     if not isinstance(rows, list):
         raise ValueError(f"{name}.markers must be a list")
@@ -147,7 +140,7 @@ def _body(name: str, table: object) -> SideBody:
         where = f"{name}.markers.{index}"
         if not isinstance(row, dict):
             raise ValueError(f"{where} must be a table with azimuth_deg and z_m")
-        _only(row, where, ("azimuth_deg", "z_m"))
+        check_keys(row, where, ("azimuth_deg", "z_m"))
         azimuth_deg = number(row, "azimuth_deg", f"{where}.azimuth_deg")
         check_amount(f"{where}.azimuth_deg", azimuth_deg, 3600.0)
         azimuths.append(math.radians(azimuth_deg))
@@ -159,9 +152,3 @@ def _body(name: str, table: object) -> SideBody:
     if rows or "marker_radius_m" in table:
         wide_m = number(table, "marker_radius_m", f"{name}.marker_radius_m")
     return SideBody(name, radius_m, bottom_m, top_m, tuple(azimuths), tuple(heights), wide_m)
-
-
-def _only(table: Mapping[str, Any], where: str, keys: Sequence[str]) -> None:
-    unknown = set(table) - set(keys)
-    if unknown:
-        raise ValueError(f"'{where}.{min(unknown)}' is no known key (a typo?)")

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.files.errors import FileError
-from groundstation.files.json_file import parse_json
+from groundstation.files.json_file import made_of_json
 from groundstation.files.reading import read_bytes
 from groundstation.files.values import check_amount, number, numbers, whole_number
 from groundstation.frames import turned_axes
@@ -115,11 +114,7 @@ class CameraCalibration:
         Raises:
             FileError: It is no JSON, or a key is missing or impossible.
         """
-        found = parse_json(data, path)
-        try:
-            return cls.from_mapping(found)
-        except ValueError as error:
-            raise FileError(f"{path}: {error}.") from error
+        return made_of_json(data, path, cls.from_mapping)
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> "CameraCalibration":

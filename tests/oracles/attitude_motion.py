@@ -1,4 +1,4 @@
-"""How bodies turn between frames: Euler's equations, with gravity gradient where the orbit is known.
+"""What ``attitude.c`` does, in NumPy: Euler's equations, with gravity gradient where the orbit is known.
 
 ``J w' + w x J w = 3 n^2 e x J e``: w the absolute rate, e the direction away from the Earth, in body axes.
 Many bodies at once, as a filter's members are; the turn is a Magnus series of fourth order over short steps.
@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.relative_navigation.attitude_motion import MOST_STEPS, STEP_RAD, Turned
+
 Floats = NDArray[np.float64]
 
-STEP_RAD = 0.3
-"""A step turns no body farther: its error is then some 1e-5 rad, whatever the inertia."""
-MOST_STEPS = 400
 _EYE = np.eye(3)
 
 
@@ -33,23 +32,6 @@ class Vertical:
     up_body: Floats
     normal_body: Floats
     rate_rad_s: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Turned:
-    """What a span did to m bodies.
-
-    Attributes:
-        rates_rad_s: At its end, body axes, (m, 3).
-        turns: (m, 3, 3): ``inertial_from_body`` at the end is that of the beginning times this.
-        angle_by_rate: Small turn at the end (body axes) by rate at the beginning, (m, 3, 3), s.
-        rate_by_rate: (m, 3, 3).
-    """
-
-    rates_rad_s: Floats
-    turns: Floats
-    angle_by_rate: Floats
-    rate_by_rate: Floats
 
 
 def turn_on(

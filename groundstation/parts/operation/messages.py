@@ -1,5 +1,7 @@
 """How a rig is run: recorder, calibrations in use, health, latency."""
 
+import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,6 +15,7 @@ from groundstation.declarations.message import (
     Text,
     TextSequence,
 )
+from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.topic import Rank, Scope, Topic
 
 
@@ -57,6 +60,14 @@ class CalibrationInUse(Message):
     name: Text
     sha256: Text
     content: Text
+
+    @classmethod
+    def of(cls, now_ns: int, vehicle: str, files: Iterable[RigFile]) -> "CalibrationInUse":
+        """What is published of the files that a node has loaded, as one."""
+        loaded = tuple(files)
+        content = [file.text() for file in loaded]
+        digest = hashlib.sha256("".join(content).encode()).hexdigest()
+        return cls(now_ns, vehicle, " ".join(file.path.name for file in loaded), digest, "\n".join(content))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,5 @@
 """Overhead tracker: colour frames of the camera over the table in, a fix or a refusal per mock-up out."""
 
-import hashlib
 import math
 from collections.abc import Iterator, Sequence
 
@@ -50,10 +49,7 @@ class OverheadTracker(Node):
         self._repeats = PictureRepeats()
 
     def start(self, now_ns: int) -> Iterator[Message]:
-        content = [file.text() for file in self._files]
-        name = " ".join(file.path.name for file in self._files)
-        digest = hashlib.sha256("".join(content).encode()).hexdigest()
-        yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
+        yield CalibrationInUse.of(now_ns, self.vehicle, self._files)
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns

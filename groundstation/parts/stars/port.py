@@ -2,33 +2,17 @@
 
 from dataclasses import dataclass
 
-from drivers.laboratory import CameraFrame
 from groundstation.declarations.message import Message
 from groundstation.declarations.port import Edge, Port
-from groundstation.declarations.topic import Delivery
-from groundstation.parts.edges import STREAM_BAUD, ByteEdge, CameraEdge
+from groundstation.parts.edges import STREAM_BAUD, ByteEdge, GreyCameraPort
 from groundstation.parts.stars.messages import FixBytes, StarImage
 
 
 @dataclass(frozen=True)
-class StarCameraPort(Port):
-    """Grey pictures as they arrive; only the newest counts."""
+class StarCameraPort(GreyCameraPort):
+    """The camera that looks up."""
 
     reads = StarImage
-    delivery = Delivery.NEWEST
-
-    timeout_s: float
-
-    def to_message(self, stamp_ns: int, data: object) -> Message:
-        assert isinstance(data, CameraFrame)
-        height, width = data.image.shape
-        device_ns = data.stamp_device_ns or 0
-        return StarImage(
-            stamp_ns, self.vehicle, device_ns, height, width, "mono8", width, data.image.tobytes()
-        )
-
-    def open(self) -> Edge:
-        return CameraEdge(str(self.address), self.timeout_s)
 
 
 @dataclass(frozen=True)

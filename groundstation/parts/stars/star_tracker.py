@@ -1,6 +1,5 @@
 """Star tracker: light spots in, pose of the body or the reason for none out."""
 
-import hashlib
 from collections import OrderedDict
 from collections.abc import Iterator
 
@@ -83,10 +82,7 @@ class StarTracker(Node):
         self._troubles: OrderedDict[int, str] = OrderedDict()  # of pictures, by their stamps
 
     def start(self, now_ns: int) -> Iterator[Message]:
-        content = [file.text() for file in self._files]
-        name = " ".join(file.path.name for file in self._files)
-        digest = hashlib.sha256("".join(content).encode()).hexdigest()
-        yield CalibrationInUse(now_ns, self.vehicle, name, digest, "\n".join(content))
+        yield CalibrationInUse.of(now_ns, self.vehicle, self._files)
 
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         match message:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from drivers.laboratory import ChannelKind, InjectOrder
 from drivers.motion_capture.pose import MotionCapturePose
 from firmware_emulator.laboratory import EmulatedLaboratory
-from firmware_emulator.sky.scene import SceneError
+from firmware_emulator.scene_files import SceneError
 
 MS = 1_000_000
 S = 1_000_000_000
