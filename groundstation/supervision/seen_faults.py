@@ -83,7 +83,7 @@ def _silences(seen: Sightings, now_ns: int, *, is_grounded: bool) -> Iterator[tu
     elif seen.recorder_room_s < LEAST_ROOM_S:
         room_s = seen.recorder_room_s
         yield "disk_low", f"room for {room_s:.0f} s" if room_s else "it is full: nothing is recorded"
-    for name in seen.leaders:
+    for name in seen.neighbours:
         if name == seen.seen_leader:
             yield from _unseen_leader(seen, now_ns)
             continue

@@ -64,7 +64,7 @@ class Sightings:
         own: The newest estimate; None before the first.
         placed_ns: Since when the estimator places it without a break; None while it does not.
         others: Those of the other vehicles.
-        leaders: Names of vehicles whose states its controller wants.
+        neighbours: Names of vehicles whose states its controller wants.
         seen_leader: The one of them that the side camera tells of instead; empty where there is none.
         leader_seen_ns: When it was last seen; None before the first time.
         name: Of this vehicle.
@@ -94,7 +94,7 @@ class Sightings:
     own: Seen | None = None
     placed_ns: int | None = None
     others: dict[str, Seen] = field(default_factory=dict)
-    leaders: tuple[str, ...] = ()
+    neighbours: tuple[str, ...] = ()
     seen_leader: str = ""
     leader_seen_ns: int | None = None
     name: str = ""

@@ -84,9 +84,7 @@ class ControllerNode(Node):
         if sees:
             self.inputs = (*self.inputs, LeaderState)
         self._chosen = law
-        self._law: Controller = law.program
-        if waits and law.holding is not None:
-            self._law = law.holding
+        self._law = law.to_goal if waits else law.controller
         self._make = make
         self._goal = goal
         self._keep_in = keep_in
@@ -109,7 +107,7 @@ class ControllerNode(Node):
         if payload is VehicleState:
             return self._vehicles
         if payload is Supervision:
-            cares = isinstance(self._chosen.program, KeepsPlaces)
+            cares = isinstance(self._chosen.controller, KeepsPlaces)
             return tuple(name for name in self._vehicles[1:] if cares and name in self._followed)
         return self._vehicles[1:] if payload is ControlStatus else (self.vehicle,)
 
@@ -145,7 +143,7 @@ class ControllerNode(Node):
                 refusal = self._lease.objection(message, now_ns)
                 yield answer(message, now_ns, refusal or self._change(message))
             case Request() if message.action == RESUME and not self._lease.objection(message, now_ns):
-                self._take_over(self._chosen.program)  # the supervisor answers
+                self._take_over(self._chosen.controller)  # the supervisor answers
             case Lease():
                 self._lease.take(message)
 
@@ -180,7 +178,7 @@ class ControllerNode(Node):
         if message.status != "flying" or message.vehicle not in self._followed:
             return
         if message.vehicle == self._sees:
-            return  # the side camera tells where it is
+            return  # where it is comes from the side camera
         state = control_state(message)
         self._states[message.vehicle] = (message.stamp_ns, state)
         if message.vehicle == self.vehicle:
@@ -205,7 +203,7 @@ class ControllerNode(Node):
         refusal = self._others.objection((x, y))
         if not refusal:
             self._goal = Goal((x, y), heading)
-            self._take_over(self._chosen.holding or self._chosen.program)
+            self._take_over(self._chosen.to_goal)
         return refusal
 
     def _change(self, request: Request) -> str:
@@ -241,7 +239,7 @@ class ControllerNode(Node):
         self._chosen = law
         self._followed = frozenset((self.vehicle, *law.neighbours))
         self._states = {name: row for name, row in self._states.items() if name in self._followed}
-        self._take_over(law.holding or law.program)
+        self._take_over(law.to_goal)
 
     def _is_kept_to(self, place_m: Vector2) -> bool:
         return min(self._keep_in.edge_distances_m(place_m)) >= 0.0

@@ -25,7 +25,7 @@ class Law:
 
     Attributes:
         name: A row of the table of controllers.
-        program: The law.
+        controller: The law.
         holding: Flies to the goal and holds it while the law's own program is interrupted; None where the law
             has no program and follows the goal itself.
         neighbours: Other vehicles whose states it wants.
@@ -33,10 +33,15 @@ class Law:
     """
 
     name: str
-    program: Controller
+    controller: Controller
     holding: Controller | None = None
     neighbours: tuple[str, ...] = ()
     led_by: tuple[str, ...] = ()
+
+    @property
+    def to_goal(self) -> Controller:
+        """What flies to a goal, and waits there until the law's own program is resumed."""
+        return self.holding or self.controller
 
 
 Maker = Callable[[str, Mapping[str, Any]], Law]
@@ -76,11 +81,11 @@ def law_of(rig: Rig, vehicle: str, section: ControlSection, key: str) -> Law:
     _check_heading(rig, vehicle, config, neighbours)
     model, keep_in = rig.type_of(vehicle).model(), rig.table.keep_in()
     try:
-        program = row.make(config, model, keep_in)
+        law = row.make(config, model, keep_in)
     except ValueError as error:
         raise ValueError(f"{key}.parameters: {error}") from error
     holding = make_controller(HOLDING, {}, model, keep_in) if row.has_program else None
-    return Law(section.controller, program, holding, neighbours, tuple(row.led_by(config)))
+    return Law(section.controller, law, holding, neighbours, tuple(row.led_by(config)))
 
 
 def _check_heading(rig: Rig, vehicle: str, config: BaseModel, neighbours: tuple[str, ...]) -> None:

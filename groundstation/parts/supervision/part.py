@@ -55,7 +55,7 @@ def _supervisor(rig: Rig, vehicle: str) -> Node:
         MOCK_UP_RADIUS_M,
         began_ns=0,
         most_frames_hz=2.0 * NODE_FRAMES_HZ * len(rig.vehicles) + SPARE_FRAMES_HZ,
-        leaders=neighbours_of(rig, vehicle),
+        neighbours=neighbours_of(rig, vehicle),
         seen_leader=rig.vehicle(vehicle, RelativeNavigationOfVehicle).leader_seen(),
         name=vehicle,
         dockings=dockings_of(rig),

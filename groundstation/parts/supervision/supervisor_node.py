@@ -136,7 +136,7 @@ class SupervisorNode(Node):
             case Wrench():
                 sightings.demand_ns = now_ns
             case ControlStatus():  # it may be changed to another law
-                sightings.leaders = message.neighbours
+                sightings.neighbours = message.neighbours
             case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
                 sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns
             case ValveShares():

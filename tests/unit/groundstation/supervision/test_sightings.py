@@ -116,7 +116,7 @@ class TestSilence:
         assert set(found(known)) == {"recorder_down"}
 
     def test_states_of_leaders_may_be_a_second_old(self, known, seen):
-        known.leaders = ("beta", "gamma", "delta")
+        known.neighbours = ("beta", "gamma", "delta")
         known.others = {"beta": seen(19 * S), "delta": seen(0), "other": seen(0)}
         assert found(known) == {"leader_old": "delta: the newest state is 20.0 s old"}
         known.others = {"beta": seen(19 * S), "other": seen(0)}
@@ -125,7 +125,7 @@ class TestSilence:
         assert found(known) == {"leader_old": "beta: the newest state is 1.0 s old"}
 
     def test_a_leader_that_is_seen_counts_by_its_sightings(self, known, seen):
-        known.leaders, known.seen_leader = ("beta",), "beta"
+        known.neighbours, known.seen_leader = ("beta",), "beta"
         known.others = {"beta": seen(0)}
         assert found(known) == {}  # the vehicle does not know its own place
         known.placed_ns = 19 * S
