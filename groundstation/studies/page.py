@@ -52,10 +52,12 @@ def _head(study: Study, drawn: Sequence[tuple[FigureRow, Drawn]]) -> str:
         f'<li><a href="#{anchor_of(row)}">{escape(row.label)}</a>: {escape(row.title)}</li>'
         for row, _ in drawn
     )
+    judged = f'<span class="comes">{good} published numbers come out</span>{_does_not(bad)}; the others'
+    if not good + bad:
+        judged = "No published number is judged: they"
     return (
         f"<header>\n<h1>{escape(study.title)}, run again</h1>\n<p>{escape(study.source)}</p>\n"
-        f'<p><span class="comes">{good} published numbers come out</span>'
-        f"{_does_not(bad)}; the others are not stated, or not compared.</p>\n"
+        f"<p>{judged} are not stated, or not compared.</p>\n"
         f'<p class="faint">{escape(ABOUT)} {escape(study.about)} Made with {escape(software())}.</p>\n'
         f'<ul class="toc">{entries}</ul>\n</header>\n'
     )

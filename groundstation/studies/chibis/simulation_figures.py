@@ -100,10 +100,12 @@ def draw_errors(data: Mapping[str, Simulated]) -> Drawn:
     """Figures 2.12, 2.13 and 2.14: errors against time, before and after the tips are lost."""
     found = data["simulation"]
     t_s = found.truth.times_s
+    lasts = {side: float(t_s[found.last(side)]) for side in SIDES}
+    whose = ", ".join(f"{last_s:.0f} s ({WORDS[side]})" for side, last_s in lasts.items())
     pictures = [
         (
-            "Errors against time; dashed: last solved frames.",
-            _error_picture(found, t_s, "t, s", tuple(float(t_s[found.last(side)]) for side in SIDES)),
+            f"Errors against time; dashed: last solved frames, {whose}.",
+            _error_picture(found, t_s, "t, s", tuple(lasts.values())),
         ),
         (
             "The same against distance, up to the last solved frame.",
