@@ -50,7 +50,7 @@ def add_api(app: FastAPI, console: Console) -> None:
         try:
             body = await body_of(request)
             vehicle, action, arguments = text_of(body, "vehicle"), text_of(body, "action"), arguments_of(body)
-            author = console.office.author(action, token_of(request, body))
+            author = await console.office.author(action, token_of(request, body))
             if action == "stop":
                 return JSONResponse({"reason": "", **await console.press(console.desk, body)})
             accepted, reason = await console.desk.request(vehicle, action, arguments, author)

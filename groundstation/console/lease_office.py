@@ -15,10 +15,10 @@ class LeaseOffice:
 
     Args:
         desk: To ask at.
-        holder: Who holds control now; empty for nobody.
+        holder: Who holds control now; empty for nobody; None while nothing of the lease was received yet.
     """
 
-    def __init__(self, desk: Desk, holder: Callable[[], str]) -> None:
+    def __init__(self, desk: Desk, holder: Callable[[], str | None]) -> None:
         self._desk = desk
         self._holder = holder
         self._passed_to: tuple[str, float] | None = None
@@ -62,7 +62,7 @@ class LeaseOffice:
         self._passed_to = (to, time.monotonic()) if to else None
         await self._until_held_by(to)
 
-    def author(self, action: str, token: str) -> str:
+    async def author(self, action: str, token: str) -> str:
         """In whose name an action is asked for.
 
         Raises:
@@ -73,6 +73,8 @@ class LeaseOffice:
             return name or "console"
         if not name:
             raise NotAllowedError("take control first: only who holds it may ask for this")
+        # a console that was started again learns it from the next repetition of the lease
+        await self._until(lambda: self._holder() is not None)
         holder = self._holder()
         if holder != name:
             raise NotAllowedError(f"control is held by {holder or 'nobody'}: take it first")
@@ -80,8 +82,11 @@ class LeaseOffice:
 
     async def _until_held_by(self, name: str) -> None:
         """Wait until the lease says so here, too: an answer comes sooner than what it changed."""
+        await self._until(lambda: (self._holder() or "") == name)
+
+    async def _until(self, is_so: Callable[[], bool]) -> None:
         until_s = time.monotonic() + ANSWER_S
-        while self._holder() != name and time.monotonic() < until_s:
+        while not is_so() and time.monotonic() < until_s:
             await asyncio.sleep(LOOK_S)
 
     def _was_passed(self, name: str) -> bool:

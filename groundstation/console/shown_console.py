@@ -11,6 +11,7 @@ from groundstation.console.hall import Hall
 from groundstation.console.lease_office import LeaseOffice
 from groundstation.console.source import Source
 from groundstation.console.wizards import Wizards
+from groundstation.declarations.lease import Lease
 from groundstation.declarations.tables import Tables
 
 Preview = Callable[[str, str, dict[str, object]], Awaitable[dict[str, Any]]]
@@ -49,9 +50,11 @@ class Console:
         self.wizards = wizards
         self.hall.greetings.append(wizards.frame)
 
-    def holder(self) -> str:
-        """Who holds control now; empty for nobody."""
+    def holder(self) -> str | None:
+        """Who holds control now; empty for nobody; None while nothing of the lease was received."""
         lease = self.hall.look().get("lease", {})
+        if self.source.feed.get(Lease, "") is None:
+            return None
         return str(lease.get("holder", "")) if lease.get("left_s", 0.0) > 0.0 else ""
 
     def topics(self) -> list[dict[str, Any]]:

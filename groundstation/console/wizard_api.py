@@ -30,7 +30,7 @@ def add_wizard(app: FastAPI, console: Console) -> None:
         try:
             body = await body_of(request)
             action = asked_of(body)
-            author = office.author(NEEDS_CONTROL, token_of(request, body))
+            author = await office.author(NEEDS_CONTROL, token_of(request, body))
             if action == "accept":
                 return JSONResponse({"accepted": True, "reason": "", "files": await wizards.accept(author)})
             if action == "discard":

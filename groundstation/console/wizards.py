@@ -38,7 +38,7 @@ class Wizards:
         rig_name: The file's name.
         feed: Where messages come from.
         desk: Where requests are made.
-        holder: Who holds control now; empty for nobody.
+        holder: Who holds control now; empty for nobody, None while that is not known.
         tell: Sends a frame to all screens.
     """
 
@@ -49,7 +49,7 @@ class Wizards:
         rig_name: str,
         feed: Feed,
         desk: Desk,
-        holder: Callable[[], str],
+        holder: Callable[[], str | None],
         tell: Callable[[str, bytes], None],
     ) -> None:
         self._rig, self._rig_name, self._feed, self._desk = rig, rig_name, feed, desk

@@ -59,15 +59,15 @@ def flight(launch, two_drawn, router):
 
 
 def tokens_of(node, topics):
-    """Parts of every token, once each of these topics has one: a topic is announced when it is used."""
+    """Parts of every token, once the node and each of these topics have one: they come one by one."""
     came = queue.SimpleQueue()
     subscriber = node.liveliness().declare_subscriber(
         "@ros2_lv/3/**", zenoh.handlers.Callback(came.put, indirect=False), history=True
     )
     announced = set()
-    while not topics <= announced:
+    while not {"NN", *topics} <= announced:
         parts = str(came.get(timeout=PATIENCE_S).key_expr).split("/")
-        announced |= set(parts[9:10])
+        announced |= {parts[5], *parts[9:10]}
     subscriber.undeclare()
     return [str(reply.ok.key_expr).split("/") for reply in node.liveliness().get("@ros2_lv/3/**")]
 

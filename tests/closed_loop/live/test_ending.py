@@ -11,6 +11,8 @@ from groundstation.recording.reader import Recording
 
 pytestmark = pytest.mark.slow
 
+ANSWERS_NS = 40_000_000
+"""A valve node reports each 20 ms what it has received by then."""
 RIGS = Path(__file__).parents[3] / "examples" / "rigs"
 
 
@@ -34,7 +36,9 @@ def test_a_run_ends_within_three_seconds_and_leaves_nothing(launch, two_drawn, n
         last = newest(run.recording, ValveCommand, vehicle)
         assert last.open_mask == 0
         assert last.stop_reason != 255  # the last word is a stop
-        assert newest(run.recording, ValveStatus, vehicle).open_mask == 0
+        status = newest(run.recording, ValveStatus, vehicle)
+        # on a busy machine the process ends before the node has answered its last word
+        assert status.open_mask == 0 or status.stamp_ns < last.stamp_ns + ANSWERS_NS
 
 
 def test_a_run_that_is_still_starting_ends_as_soon(launch, nothing_left):

@@ -1,10 +1,14 @@
 """Who may ask: roles, tokens, foreign pages."""
 
+import asyncio
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.console.access import Access, Role, new_token
+from groundstation.console.desk import NotAllowedError
+from groundstation.console.lease_office import LeaseOffice
 from groundstation.console.tokens import Tokens
 
 LAN = Access("192.168.1.5", 8400, ("station.lab",), "looks", "flies", "server.pem", "server.key")
@@ -86,3 +90,21 @@ def test_what_is_no_token_shows_nobody(text: str) -> None:
 @pytest.mark.parametrize("host", ["[", "[::1", "[x]"])
 def test_a_host_that_is_no_address_is_foreign(host: str) -> None:
     assert Access().foreign({"host": host})
+
+
+class _Desk:
+    """What a lease office needs of a desk that asks nobody."""
+
+    tokens = Tokens(b"secret")
+
+
+def test_a_console_that_was_started_again_waits_until_it_knows_who_holds_control() -> None:
+    known: list[str | None] = [None, None, "anna"]
+
+    def holder() -> str | None:
+        return known.pop(0) if len(known) > 1 else known[0]
+
+    office = LeaseOffice(_Desk(), holder)  # type: ignore[arg-type]
+    assert asyncio.run(office.author("arm", _Desk.tokens.of("anna"))) == "anna"
+    with pytest.raises(NotAllowedError, match="held by anna"):
+        asyncio.run(office.author("arm", _Desk.tokens.of("bert")))
