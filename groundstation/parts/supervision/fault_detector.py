@@ -30,6 +30,9 @@ VALVES = 8
 """Of a valve node."""
 MOST_BEHIND = 3
 """Commands, 20 ms each, that the node may be behind."""
+FLOATING_NS = 300_000_000
+"""While no status of the valve node says for so long that the air is on, bearings may stand on the glass: a
+supervisor that is paused or dead publishes no landing, the node cuts the air itself."""
 LIFTED_NS = 500_000_000
 """After the float air came on bearings lift: until then motion says nothing about valves."""
 
@@ -74,6 +77,7 @@ class FaultDetector(Node):
         self._zeros = (0.0, (0.0, 0.0))  # of the rate, of the forces
         self._floats_from_ns: int | None = None
         self._node_ns = 0
+        self._floating_ns = -FLOATING_NS  # the newest status by which the air is on
         self._lag = CommandLag()
         self._disturbed_ns = -DISTURBED_NS
         self._has_rested = False  # as long as the process lives: one that starts in flight knows no zeros
@@ -93,6 +97,8 @@ class FaultDetector(Node):
             case ValveStatus():
                 if self._lag.is_late(message.stamp_ns, message.counter):
                     self._valves.skip_late_command()
+                if message.floating:
+                    self._floating_ns = now_ns
                 if (
                     message.armed
                     and not message.dead_man
@@ -141,18 +147,24 @@ class FaultDetector(Node):
             tick_ms=imu.tick_ms,
         )
         self._hold_up.sample(now_ns, imu.stamp_ns)
+        if self._floats_from_ns is not None and now_ns - self._floating_ns > FLOATING_NS:
+            self._disturb(now_ns)
         if not (imu.valid and self._is_carried(now_ns)):
             return False
         if imu.elapsed_ms > LONGEST_HOLE_MS or self._hold_up.excess_s(now_ns) > HELD_UP_S:
-            self._disturbed_ns = now_ns
-            self._imu.reset()
-            self._begin_again()
+            self._disturb(now_ns)
         rate_rad_s = imu.rate_body_rad_s - self._zeros[0]
         self._imu.sample(imu.stamp_ns, rate_rad_s)
         if now_ns - self._node_ns > NODE_NS:
             self._begin_again()
             return False
         return self._valves.sample(imu.stamp_ns, imu.window_s, rate_rad_s, imu.force_body_m_s2)
+
+    def _disturb(self, now_ns: int) -> None:
+        """What was gathered is of another motion; for a while nothing is judged."""
+        self._disturbed_ns = now_ns
+        self._imu.reset()
+        self._begin_again()
 
     def _begin_again(self) -> None:
         """What was found stays: a hole in the samples mends no valve."""
