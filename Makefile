@@ -5,6 +5,9 @@ CORE := .venv/.core
 PEERS := .venv/.peers
 EXTRAS := .venv/.extras
 
+# a machine may be set to keep no bytecode: then each of the hundreds of processes that tests start compiles everything
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: run test test-all check bench bench-full mutate docs clean zig
 .DEFAULT_GOAL := help
 
