@@ -1,15 +1,15 @@
 """Options of ``run`` that are about the console, and the address that it prints."""
 
-import socket
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from groundstation.console.access import LOOPBACK, Access, new_token
+from groundstation.console.access import Access, new_token
 from groundstation.console.options import attendant
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.attendant import Attendant
+from groundstation.launch.listening import first_free
 
 FIRST_PORT, PORTS_TRIED = 8400, 100
 
@@ -91,16 +91,4 @@ def _names_of(certificate: Path) -> tuple[str, ...]:
 
 
 def _free(host: str, first: int) -> int:
-    """The first port from here on that nobody listens at."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    for port in range(first, min(first + PORTS_TRIED, 65536)):
-        with socket.socket(family) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((host, port))
-            except OSError as error:
-                if host not in LOOPBACK and port == first and error.errno not in (98, 48, 13):
-                    raise UsageError(f"the console cannot listen at {host}: {error.strerror}") from error
-                continue
-            return port
-    raise UsageError(f"no port from {first} to {first + PORTS_TRIED - 1} is free for the console")
+    return first_free(host, first, PORTS_TRIED, "--console-host")

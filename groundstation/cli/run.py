@@ -18,7 +18,7 @@ from groundstation.cli.console_option import (
     attendants,
 )
 from groundstation.cli.live_view import run_live
-from groundstation.cli.run_beside import beside_of
+from groundstation.cli.run_beside import beside_of, check_ports
 from groundstation.cli.run_files import check_recording, finish_folder, finished_files, kept_in
 from groundstation.cli.run_progress import RunProgress
 from groundstation.core.library import default_core
@@ -172,6 +172,8 @@ def run(
             raise UsageError("--lockstep needs --duration: virtual time has no end of its own")
     elif seed is not None:
         raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
+    else:
+        check_ports(hub_port, joined)
     trouble = ""
     with kept_in(record, loaded, text, loaded.name or file.stem) as (recording, folder):
         try:

@@ -1,6 +1,7 @@
 """What runs beside a rig where it is asked for: bridges, and guests of other hosts on the bus."""
 
-import socket
+import re
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,6 +9,9 @@ from groundstation.bridges import foxglove, ros2
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.attendant import Attendant
 from groundstation.launch.guests import DEFAULT_PORT, Guests
+from groundstation.launch.listening import check_listening, listening
+
+LOOPBACK = "127.0.0.1"
 
 
 class Beside(NamedTuple):
@@ -51,32 +55,41 @@ def beside_of(
     bridges = []
     if foxglove_port is not None:
         foxglove.check_installed()
-        bridges.append(foxglove.attendant(_free(foxglove_port)))
+        bridges.append(foxglove.attendant(check_listening(foxglove.HOST, foxglove_port, "--foxglove-port")))
     if router is not None:
-        protocol, slash, address = router.partition("/")
-        if not (slash and protocol in ("tcp", "udp", "tls", "quic", "ws") and ":" in address):
+        if not _is_router(router):
             raise UsageError(f"--ros2 is {router!r}, expected a router such as tcp/127.0.0.1:7447")
         bridges.append(ros2.attendant(ros2.Told(router, domain)))
     return Beside(tuple(bridges), None if guests is None else _guests(guests, certificates))
 
 
-def _free(port: int) -> int:
-    """The port, or a free one for 0.
+def check_ports(hub_port: int, guests: Guests | None) -> None:
+    """Refuse ports of the hub that cannot be listened on, or are one and the same.
+
+    Args:
+        hub_port: On loopback; 0 for a free one.
+        guests: Where other hosts connect; None: nowhere.
 
     Raises:
-        UsageError: Somebody serves on it: the run would begin, and have no server.
+        UsageError: It names the option.
     """
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((foxglove.HOST, port))
-        except OSError as error:
-            raise UsageError(
-                f"port {port} of {foxglove.HOST} is taken ({error.strerror}): choose another with "
-                "--foxglove-port"
-            ) from error
-        free: int = probe.getsockname()[1]
-        return free
+    with ExitStack() as held:
+        if hub_port:
+            held.enter_context(listening(LOOPBACK, hub_port, "--hub-port"))
+        if guests is not None:
+            held.enter_context(listening(guests.address, guests.port, "--guests"))
+
+
+def _is_router(asked: str) -> bool:
+    """Whether it is an endpoint that Zenoh can connect to: a protocol, a host and a port."""
+    protocol, _, rest = asked.partition("/")
+    host, _, port = re.split(r"[?#]", rest, maxsplit=1)[0].rpartition(":")  # settings come behind
+    is_host = re.fullmatch(r"\[[^\s/\[\]]+\]|[^\s:/\[\]]+", host) is not None and host.isprintable()
+    return protocol in ("tcp", "udp", "tls", "quic", "ws") and is_host and _is_port(port)
+
+
+def _is_port(word: str) -> bool:
+    return word.isascii() and word.isdecimal() and len(word) <= 5 and 0 < int(word) < 65536
 
 
 def _guests(asked: str, certificates: Path | None) -> Guests:
@@ -88,7 +101,7 @@ def _guests(asked: str, certificates: Path | None) -> Guests:
     address, colon, port = asked.rpartition(":")
     if not colon or asked.endswith("]") or (asked.count(":") > 1 and not asked.startswith("[")):
         address, port = asked, str(DEFAULT_PORT)
-    if not (port.isdecimal() and 0 < int(port) < 65536 and address):
+    if not (_is_port(port) and address):
         raise UsageError(f"--guests is {asked!r}, expected an address such as 0.0.0.0 or 192.168.1.20:7449")
     if certificates is None:
         raise UsageError("--guests wants --guests-certificates, which `groundstation certificates` makes")

@@ -76,10 +76,10 @@ class Access:
         """Why it must not be opened so; empty if it may."""
         if self.is_loopback:
             return ""
+        if not (self.certificate and self.key):  # first: who has certificates is given tokens
+            return f"a console at {self.host} needs TLS: make certificates with `groundstation certificates`"
         if not (self.observer and self.operator):
             return f"a console at {self.host} needs tokens: nobody may fly who merely reaches it"
-        if not (self.certificate and self.key):
-            return f"a console at {self.host} needs TLS: make certificates with `groundstation certificates`"
         return ""
 
     def role(self, headers: Mapping[str, str], cookie: str, token: str) -> Role:

@@ -11,6 +11,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
+from groundstation.cli import console_option
 from groundstation.cli.console_option import console_access
 from groundstation.declarations.errors import UsageError
 
@@ -54,10 +55,26 @@ def test_a_port_that_is_taken_is_passed_over() -> None:
     assert found.greeting == (f"console: {found.address}",)
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::"])
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 def test_a_network_is_not_let_in_without_certificates(host: str) -> None:
-    with pytest.raises(UsageError):
+    with pytest.raises(UsageError, match="needs TLS: make certificates with `groundstation certificates`"):
         console_access(host, 8400, None)
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "a..b", "[::1]", ""])
+def test_a_host_that_is_none_of_this_machine_is_refused_in_a_sentence(host: str) -> None:
+    with pytest.raises(UsageError, match=r"is no address of this machine .* with --console-host"):
+        console_access(host, 8400, None)
+
+
+def test_where_no_port_is_free_it_says_which_were_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind((HOST, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        monkeypatch.setattr(console_option, "PORTS_TRIED", 1)
+        with pytest.raises(UsageError, match=f"no port from {port} to {port} of {HOST} is free"):
+            console_access(HOST, port, None)
 
 
 def test_a_folder_without_certificates_is_named(tmp_path: Path) -> None:

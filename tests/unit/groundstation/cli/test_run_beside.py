@@ -9,6 +9,7 @@ from groundstation.bridges import foxglove
 from groundstation.cli.run_beside import beside_of
 from groundstation.declarations.errors import UsageError
 from groundstation.launch.guests import DEFAULT_PORT, FILES
+from groundstation.launch.listening import check_listening
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 RIG, SCENARIO = EXAMPLES / "rigs" / "drawn_fixes.toml", EXAMPLES / "scenarios" / "go_to.toml"
@@ -21,6 +22,15 @@ RIG, SCENARIO = EXAMPLES / "rigs" / "drawn_fixes.toml", EXAMPLES / "scenarios" /
         ((RIG, "--lockstep", "--duration", "1", "--ros2", "tcp/localhost:7447"), "go with real time"),
         ((RIG, "--ros2", "localhost"), "--ros2 is 'localhost', expected a router such as tcp/127.0.0.1:7447"),
         ((RIG, "--ros2", "serial/ttyS0:1"), "expected a router"),
+        ((RIG, "--ros2", "tcp/127.0.0.1:99999"), "expected a router"),
+        ((RIG, "--ros2", "tcp/127.0.0.1:0"), "expected a router"),
+        ((RIG, "--ros2", "tcp/127.0.0.1:http"), "expected a router"),
+        ((RIG, "--ros2", "tcp/127.0.0.1:"), "expected a router"),
+        ((RIG, "--ros2", "tcp/:7447"), "expected a router"),
+        ((RIG, "--ros2", "tcp/::1:7447"), "expected a router"),
+        ((RIG, "--ros2", "tcp/two words:7447"), "expected a router"),
+        ((RIG, "--ros2", "tcp/\udcff:7447"), "expected a router"),
+        ((RIG, "--ros2", f"tcp/127.0.0.1:{'7' * 5000}"), "expected a router"),
         (
             (RIG, "--guests", "0.0.0.0", "--guests-certificates", "nowhere"),
             "nowhere/ca.pem is not there: make",
@@ -42,14 +52,64 @@ def test_a_missing_extra_is_named(monkeypatch, groundstation):
         groundstation("run", RIG, "--foxglove")
 
 
-def test_a_port_that_is_taken_is_named(monkeypatch, groundstation):
+@pytest.fixture
+def taken():
+    """A port of loopback on which somebody listens."""
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        yield listening.getsockname()[1]
+
+
+@pytest.fixture
+def certificates(tmp_path):
+    folder = tmp_path / "certificates"
+    folder.mkdir()
+    for name in FILES:
+        (folder / name).write_text("")
+    return folder
+
+
+def refused_before_anything_starts(groundstation, folder, *words):
+    recording = folder / "run.mcap"
+    with pytest.raises(UsageError) as refusal:
+        groundstation("run", RIG, "--headless", "--no-console", "--record", recording, *words)
+    assert not recording.exists()
+    return str(refusal.value)
+
+
+def test_a_port_of_foxglove_that_is_taken_is_named(monkeypatch, taken, groundstation):
     monkeypatch.setattr(foxglove, "find_spec", lambda _name: object())
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(UsageError, match=f"port {port} of 127.0.0.1 is taken"):
-            groundstation("run", RIG, "--foxglove", "--foxglove-port", port)
+    with pytest.raises(UsageError, match=f"port {taken} of 127.0.0.1 is taken: .* --foxglove-port"):
+        groundstation("run", RIG, "--foxglove", "--foxglove-port", taken)
+
+
+def test_a_hub_or_guests_that_cannot_be_listened_for_are_refused(
+    taken, certificates, tmp_path, groundstation
+):
+    def sentence(*words):
+        return refused_before_anything_starts(groundstation, tmp_path, *words)
+
+    is_taken = f"port {taken} of 127.0.0.1 is taken: choose another with"
+    assert sentence("--hub-port", taken) == f"{is_taken} --hub-port"
+    guests = ("--guests-certificates", certificates, "--guests")
+    assert sentence(*guests, f"127.0.0.1:{taken}") == f"{is_taken} --guests"
+    for strange in ("192.0.2.1:7449", "[nonsense]:7449", "a..b"):
+        assert "is no address of this machine" in sentence(*guests, strange)
+
+
+def test_a_port_that_two_options_name_is_refused(certificates, tmp_path, groundstation):
+    free = check_listening("127.0.0.1", 0, "")
+    words = ("--hub-port", free, "--guests", f"127.0.0.1:{free}", "--guests-certificates", certificates)
+    sentence = refused_before_anything_starts(groundstation, tmp_path, *words)
+    assert sentence == f"port {free} of 127.0.0.1 is taken: choose another with --guests"
+
+
+@pytest.mark.parametrize(
+    "router", ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tls/ros.lab:7447#root_ca_certificate=ca.pem"]
+)
+def test_routers_that_there_may_be_are_taken(router, tmp_path):
+    assert beside_of(None, router, 0, None, tmp_path, is_live=True).bridges[0].options == (router, 0)
 
 
 def test_nothing_runs_beside_a_rig_unless_it_is_asked_for(tmp_path):
