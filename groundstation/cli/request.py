@@ -32,8 +32,6 @@ _NUMBERS = {"ignore_unknown_options": True}
 ALL, STOP = "all", "stop"
 FOR_ALL = ("stop", "land", "release", "fly", "disarm", "float_off")
 """Actions that all vehicles can be asked for at once."""
-OF_RIG = ("take_control", "give_control", "start_scenario")
-"""Actions that concern the rig: asked for once, whatever vehicle is named."""
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -101,7 +99,7 @@ def request(
         given = row.check(_values(row, words))
     except ArgumentError as error:
         raise UsageError(str(error)) from error
-    if vehicle == ALL and action not in (*FOR_ALL, *OF_RIG):
+    if vehicle == ALL and action not in FOR_ALL and not row.is_of_rig:
         raise UsageError(f"{action} is asked of one vehicle; all can be asked to {', '.join(FOR_ALL)}")
     author = _author(name or user_name(), action)
     runs = choose_runs(pid) if vehicle == ALL else [choose_run(vehicle, pid)]
@@ -110,7 +108,7 @@ def request(
         try:
             if action == STOP:
                 return _stop(run, EVERY if vehicle == ALL else vehicle, author, timeout)
-            return _ask(run, vehicle, action, given, author, timeout)
+            return _ask(run, vehicle, row, given, author, timeout)
         except GroundStationError as error:
             if len(runs) == 1:
                 raise
@@ -145,12 +143,12 @@ def _author(name: str, action: str) -> str:
 
 
 def _ask(
-    run: RunningRig, vehicle: str, action: str, given: Mapping[str, Value], author: str, timeout_s: float
+    run: RunningRig, vehicle: str, action: Action, given: Mapping[str, Value], author: str, timeout_s: float
 ) -> list[_Answer]:
     vehicles = run.vehicles if vehicle == ALL else (vehicle,)
-    if action in OF_RIG:
+    if action.is_of_rig:
         vehicles = ("",)
-    acks = ask_each(run.endpoint, vehicles, action, given, author, timeout_s)
+    acks = ask_each(run.endpoint, vehicles, action.name, given, author, timeout_s)
     if len(vehicles) == 1 and not acks:
         raise GroundStationError(silence(vehicles[0], timeout_s))
     return [_answer(name, acks.get(name), timeout_s) for name in vehicles]

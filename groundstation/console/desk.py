@@ -23,7 +23,7 @@ ANSWER_S = 3.0
 SAME_TAP_S, LONGEST_TAP = 10.0, 100
 """A tap arrives by its second way within so long; later the same words are another press."""
 RIG = ""
-"""Whom requests concern that are the rig's: the lease."""
+"""Whom requests concern that are the rig's: of the lease, of a scenario."""
 
 
 class NotAllowedError(Exception):
@@ -67,17 +67,19 @@ class Desk:
 
         Raises:
             ArgumentError: The arguments are not those of the action.
-            NotAllowedError: There is no such action or vehicle.
+            NotAllowedError: There is no such action or vehicle, or a vehicle's action names none.
         """
         row = self._actions.get(action)
         if row is None:
             raise NotAllowedError(f"there is no action {action!r:.40} (there are {', '.join(self._actions)})")
+        vehicles = ", ".join(self._vehicles)
         if vehicle not in (*self._vehicles, RIG):
-            raise NotAllowedError(
-                f"there is no vehicle {vehicle!r:.40} (there are {', '.join(self._vehicles)})"
-            )
+            raise NotAllowedError(f"there is no vehicle {vehicle!r:.40} (there are {vehicles})")
+        if vehicle == RIG and not row.is_of_rig:
+            raise NotAllowedError(f"{action} needs a vehicle: one of {vehicles}")
         given = row.check(arguments)
-        request = requests_of((vehicle,), action, given, checked_name(author))[0]
+        whom = RIG if row.is_of_rig else vehicle
+        request = requests_of((whom,), action, given, checked_name(author))[0]
         return await self._answered(request)
 
     def press(self, vehicle: str, tap: str = "") -> "asyncio.Task[dict[str, object]]":

@@ -106,19 +106,21 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """What can be requested of a vehicle.
+    """What can be requested of a vehicle, or of the rig.
 
     Attributes:
         name: Of the action.
         answered_by: Name of the node that carries it out and answers.
         summary: For people.
         arguments: In the order in which a command line takes them.
+        is_of_rig: It concerns the rig: asked for once, whatever vehicle is named.
     """
 
     name: str
     answered_by: str
     summary: str
     arguments: tuple[Argument, ...] = ()
+    is_of_rig: bool = False
 
     def check(self, given: Mapping[str, object]) -> dict[str, Value]:
         """The arguments, complete and checked.

@@ -20,12 +20,14 @@ ACTIONS = table_of(
             Argument("for_s", "how long", float, 1.0, LONGEST_S, default=USUAL_S),
             Argument("force", "reason to take what has expired and was not given back", str, default=""),
         ),
+        is_of_rig=True,
     ),
     Action(
         "give_control",
         "lease_desk",
         "give control of the rig back, or to somebody",
         (Argument("to", "name; empty for nobody", str, default=""),),
+        is_of_rig=True,
     ),
 )
 

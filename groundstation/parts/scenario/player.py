@@ -21,7 +21,7 @@ STATUS_NS = 200_000_000
 PATIENCE_NS = 5_000_000_000
 """An answer that takes longer will not come."""
 RESUME = "resume"
-START = Action("start_scenario", "player", "begin the scenario that waits for it")
+START = Action("start_scenario", "player", "begin the scenario that waits for it", is_of_rig=True)
 BY_HAND = f"a person's {START.name}"
 STARTED_AGAIN = "the player was started again, and a timeline is not carried out twice"
 
