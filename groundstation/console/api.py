@@ -72,6 +72,8 @@ def add_api(app: FastAPI, console: Console) -> None:
 
     @app.post("/api/preview")
     async def preview(request: Request) -> Response:
+        if console.desk is None and console.preview is None:
+            return refused(409, "this is a recording: nothing can be flown ahead")
         if console.preview is None:
             return refused(409, "this rig cannot be flown in virtual time: it has no emulated twin")
         try:

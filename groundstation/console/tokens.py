@@ -24,6 +24,7 @@ class Tokens:
         """The name of a token; empty for one that is none."""
         try:
             name = bytes.fromhex(token.partition(".")[0]).decode()
-        except ValueError:
+            given = token.encode()
+        except ValueError:  # JSON can carry letters that no text has
             return ""
-        return name if secrets.compare_digest(token.encode(), self.of(name).encode()) else ""
+        return name if secrets.compare_digest(given, self.of(name).encode()) else ""

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.console.access import Access, Role, new_token
@@ -82,9 +82,15 @@ def test_a_token_shows_its_name_to_every_console_of_the_run_and_to_no_other(name
     assert Tokens(b"another run").name(token) == ""
 
 
-@given(st.text(max_size=80))
+@given(st.text(st.characters(exclude_categories=()), max_size=80))
+@example("616e6e61.\ud800")
+@example("616e6e61.flïes")
 def test_what_is_no_token_shows_nobody(text: str) -> None:
     assert Tokens(b"one run").name(text) == ""
+
+
+def test_what_it_lacks_first_is_certificates_since_tokens_come_with_them() -> None:
+    assert "needs TLS" in Access("192.168.1.5").trouble()
 
 
 @pytest.mark.parametrize("host", ["[", "[::1", "[x]"])

@@ -121,7 +121,10 @@ def test_a_screen_over_a_recording_can_ask_for_nothing(source: ReplaySource) -> 
     with TestClient(make_app(console), base_url="http://127.0.0.1:8400") as client:
         assert client.get("/api/state").json()["replay"]["is_playing"] is False
         assert client.post("/api/stop").status_code == 409
-        assert client.post("/api/request", json={"vehicle": "alpha", "action": "fly"}).status_code == 409
+        for path in ("request", "preview", "lease", "marker"):
+            found = client.post(f"/api/{path}", json={"vehicle": "alpha", "action": "fly"})
+            assert found.status_code == 409
+            assert found.json()["reason"].startswith("this is a recording: ")
 
 
 @pytest.mark.parametrize("wrong", [math.nan, "nan", "1", None, True, [], {}])
