@@ -8,13 +8,11 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from groundstation.bus.fields import Field
 from groundstation.console.access import Access
 from groundstation.console.chart_tap import Samples, find_field
 from groundstation.console.events import Event, Events
 from groundstation.console.feed import Feed
+from groundstation.console.recorded_columns import pose_at, samples_of, tracks_of
 from groundstation.console.rig_page import rig_page
 from groundstation.console.serving import serve, server_of
 from groundstation.console.shown_console import Console
@@ -35,10 +33,7 @@ MOST_STEP_S = 0.5
 SLOWEST, FASTEST = 0.01, 100.0
 MOST_EVENTS, MOST_SHOWN = 1_000_000, 4000
 """Of a recording; beyond the second a screen is told of no fix that was used."""
-MOST_SAMPLES = 20_000
-"""Of a field over the whole recording."""
 RARE_HZ = 1.0
-_S = 1_000_000_000
 
 
 class ReplaySource:
@@ -67,9 +62,9 @@ class ReplaySource:
         self._ghosts = {}
         if other is not None:
             with other:
-                self._ghosts = _tracks(other, self.vehicles)
+                self._ghosts = tracks_of(other, self.vehicles)
         self._place_ns = recording.start_ns
-        self._factor, self._is_playing = 1.0, False
+        self._factor, self._is_playing, self._is_moved = 1.0, False, False
         self._looked_s = time.monotonic()
         self.page: dict[str, Any] = {
             **rig_page(rig),
@@ -94,16 +89,20 @@ class ReplaySource:
         return (self._place_ns - self._recording.start_ns) * 1e-9
 
     def step(self) -> int:
-        """Go on by the time since the last step, if it plays."""
+        """Read where it was moved to; go on by the time since the last step, if it plays."""
         now_s = time.monotonic()
         passed_s, self._looked_s = min(now_s - self._looked_s, MOST_STEP_S), now_s
-        if self._is_playing:
-            until_ns = self._place_ns + round(passed_s * self._factor * 1e9)
-            try:
+        is_moved, self._is_moved = self._is_moved, False
+        until_ns = self._place_ns + round(passed_s * self._factor * 1e9)
+        try:
+            if is_moved:
+                self._read_before()
+            elif self._is_playing:
                 self._read(self._place_ns + 1, until_ns)
-            except RecordingError:
-                self._is_playing = False  # a hole: it stays before it, and can be moved past it
-                raise
+        except RecordingError:
+            self._is_playing = False  # a hole: it stays there, and can be moved past it
+            raise
+        if self._is_playing and not is_moved:
             self._place_ns = min(until_ns, self._recording.stop_ns)
             self._is_playing = self._place_ns < self._recording.stop_ns
         return self._place_ns
@@ -114,7 +113,7 @@ class ReplaySource:
             "replay": {"t_s": self.place_s, "is_playing": self._is_playing, "factor": self._factor}
         }
         if self._ghosts:
-            found["ghosts"] = {name: _at(track, self.place_s) for name, track in self._ghosts.items()}
+            found["ghosts"] = {name: pose_at(track, self.place_s) for name, track in self._ghosts.items()}
         return found
 
     def control(self, asked: Mapping[str, Any]) -> None:
@@ -154,7 +153,7 @@ class ReplaySource:
             wanted.setdefault(self._payloads[field.noun], set()).add(field.name)
         with Recording(self._recording.path) as own:
             found = read_columns(own, wanted) if wanted else {}
-        return {name: _column(found, field, self._payloads) for name, field in fields.items()}
+        return {name: samples_of(found, field, self._payloads) for name, field in fields.items()}
 
     def close(self) -> None:
         self._recording.close()
@@ -173,12 +172,16 @@ class ReplaySource:
                 return
 
     def _seek(self, place_ns: int) -> None:
-        place_ns = min(max(place_ns, self._recording.start_ns), self._recording.stop_ns)
+        """Only move: a slider asks hundreds of times, and what it passed by need not be read."""
+        self._place_ns = min(max(place_ns, self._recording.start_ns), self._recording.stop_ns)
+        self._is_moved = True
+
+    def _read_before(self) -> None:
+        """Let all be known that a screen shows at this place."""
         self.feed.forget()
-        for message in self._rare[: bisect_right(self._rare_ns, place_ns)]:
+        for message in self._rare[: bisect_right(self._rare_ns, self._place_ns)]:
             self._take(message)
-        self._read(place_ns - BEFORE_NS, place_ns)
-        self._place_ns = place_ns
+        self._read(self._place_ns - BEFORE_NS, self._place_ns)
 
     def _read(self, start_ns: int, stop_ns: int) -> None:
         """Take the messages of a span, its end included."""
@@ -220,33 +223,6 @@ def _number(asked: Mapping[str, Any], name: str) -> float:
     if isinstance(given, bool) or not isinstance(given, int | float) or given != given:
         raise ValueError(f"{name} is {given!r:.40}, expected a number")
     return float(min(max(given, -1e300), 1e300))
-
-
-def _column(found: Mapping[Any, Any], field: Field, payloads: Mapping[str, type[Message]]) -> Samples:
-    columns = found.get((payloads[field.noun], field.owner))
-    if columns is None:
-        return np.empty(0), np.empty(0)
-    values = columns[field.name]
-    if field.place is not None:
-        values = values[:, field.place]
-    step = max(1, len(values) // MOST_SAMPLES)
-    return (columns.stamp_ns * 1e-9)[::step], values[::step].astype(np.float64)
-
-
-def _tracks(recording: Recording, vehicles: tuple[str, ...]) -> dict[str, Any]:
-    """Poses of each vehicle: t from the beginning (s), x, y (m), heading (rad)."""
-    found = read_columns(recording, {VehicleState: ("position_table_m", "heading_rad")})
-    tracks = {}
-    for (_, owner), columns in found.items():
-        if owner in vehicles and len(columns):
-            times_s = (columns.stamp_ns - recording.start_ns) / _S
-            tracks[owner] = np.column_stack((times_s, columns["position_table_m"], columns["heading_rad"]))
-    return tracks
-
-
-def _at(track: Any, t_s: float) -> list[float]:  # noqa: ANN401 an array of four columns
-    place = min(int(np.searchsorted(track[:, 0], t_s)), len(track) - 1)
-    return [float(value) for value in track[place, 1:]]
 
 
 def look_at(path: Path, other: Path | None, access: Access, listening: Callable[[], None]) -> None:

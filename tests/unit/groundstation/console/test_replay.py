@@ -127,6 +127,39 @@ def test_a_screen_over_a_recording_can_ask_for_nothing(source: ReplaySource) -> 
             assert found.json()["reason"].startswith("this is a recording: ")
 
 
+def test_a_slider_that_asks_hundreds_of_times_costs_one_read(
+    source: ReplaySource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source.step()
+    reads = []
+    read = source._recording.messages
+
+    def counted(*words: object) -> object:
+        reads.append(words)
+        return read(*words)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(source._recording, "messages", counted)
+    last_s = source.page["replay"]["duration_s"]
+    for number in range(300):
+        source.control({"what": "seek", "t_s": last_s * number / 300})
+    assert source.extra()["replay"]["t_s"] == pytest.approx(last_s * 299 / 300)  # it is there at once
+    assert reads == []
+    source.step()
+    source.step()
+    assert len(reads) == 1
+
+
+def test_it_is_played_from_where_it_was_moved_to(source: ReplaySource) -> None:
+    half_s = 0.5 * source.page["replay"]["duration_s"]
+    source.control({"what": "seek", "t_s": half_s})
+    source.control({"what": "play"})
+    first_ns, second_ns = source.step(), source.step()
+    vehicle = source.vehicles[0]
+    assert first_ns < second_ns
+    assert source.place_s >= half_s - 1e-6
+    assert vehicle_state(source.feed, vehicle, second_ns)["age_s"] < 1.5
+
+
 @pytest.mark.parametrize("wrong", [math.nan, "nan", "1", None, True, [], {}])
 @pytest.mark.parametrize(("what", "name"), [("seek", "t_s"), ("speed", "factor")])
 def test_what_is_no_number_moves_nothing(source: ReplaySource, what: str, name: str, wrong: object) -> None:
@@ -145,12 +178,17 @@ def test_a_wild_number_means_the_end(source: ReplaySource, wild: float) -> None:
     assert source.extra()["replay"]["factor"] == (100.0 if wild > 0 else 0.01)
 
 
+@pytest.mark.parametrize("asked", [None, {"what": "seek", "t_s": 1.0}])
 def test_a_hole_in_the_recording_ends_the_playing_and_no_more(
-    source: ReplaySource, monkeypatch: pytest.MonkeyPatch
+    source: ReplaySource, monkeypatch: pytest.MonkeyPatch, asked: dict[str, object] | None
 ) -> None:
     def fails(*_: object) -> None:
         raise RecordingError("a chunk is damaged")
 
+    if asked is None:
+        source.step()
+    else:
+        source.control(asked)
     source.control({"what": "play"})
     monkeypatch.setattr(source, "_read", fails)
     with pytest.raises(RecordingError):
