@@ -63,7 +63,7 @@ class TerminalView:
         self._console = console
         self._live: Live | None = None
         self._waited_for = ""
-        self._greeted = 0
+        self._greeted: set[str] = set()
         self._lower_shows: object = None
         self._lower_lines = 0
         self._rendered = Segments([])
@@ -103,10 +103,10 @@ class TerminalView:
             self._run.monitor.note(waited_for)
         for line in self._run.monitor.take_lines():
             print(f"{self._elapsed_s():7.1f} s  {line}", flush=True)
-        greetings = self._run.launcher.greetings
-        for line in greetings[self._greeted :]:
-            print(line, flush=True)
-        self._greeted = len(greetings)
+        for line in self._run.launcher.greetings:
+            if line not in self._greeted:  # they come in any order, and one that is given up goes
+                self._greeted.add(line)
+                print(line, flush=True)
 
     def print_vehicles(self) -> None:
         """One line per vehicle of which anything was received."""

@@ -103,6 +103,21 @@ def test_levels_become_styles_and_what_does_not_fit_is_cut():
     assert (text.overflow, text.no_wrap) == ("ellipsis", True)
 
 
+def test_each_greeting_is_printed_once_in_whatever_order_attendants_come_and_go(full, capsys):
+    view = TerminalView(full, Console(file=io.StringIO()))
+    for greetings in (
+        ["foxglove"],
+        ["console", "foxglove"],
+        ["console"],
+        ["console", "foxglove"],
+        ["foxglove"],
+    ):
+        full.launcher.greetings = greetings
+        view.print_tidings()
+    lines = [line for line in capsys.readouterr().out.splitlines() if " s  " not in line]
+    assert lines == ["foxglove", "console"]
+
+
 def test_lines_of_a_log_name_the_vehicles_that_are_known(full, capsys):
     view = TerminalView(full, Console(file=io.StringIO()))
     view.print_tidings()
