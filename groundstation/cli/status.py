@@ -65,7 +65,10 @@ def _look(run: RunningRig) -> dict[str, Any]:
 
 
 def _lines(rig: dict[str, Any]) -> Iterator[str]:
-    """A rig for people; no line is longer than the terminal."""
+    """A rig for people; no line is longer than the terminal, unless it is about trouble."""
+    if "trouble" in rig:
+        yield from _whole_lines(rig)
+        return
     width = shutil.get_terminal_size().columns
     for line in _whole_lines(rig):
         yield line if len(line) <= width else f"{line[: width - 1]}…"

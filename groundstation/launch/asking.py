@@ -18,6 +18,7 @@ from groundstation.bus.zenoh_bus import HubError, ZenohBus
 from groundstation.declarations.errors import GroundStationError
 from groundstation.declarations.message import Message
 from groundstation.declarations.request import Ack, Request, Value
+from groundstation.launch.running import find_running
 
 _SEQUENCE = itertools.count(1)
 """Of all that this process publishes: a replay tells its messages apart by it."""
@@ -46,8 +47,14 @@ def session_with(endpoint: str) -> Iterator[ZenohBus]:
     """A session with the hub of a run.
 
     Raises:
-        GroundStationError: The hub is not there, or goes away.
+        GroundStationError: The hub is not there, goes away, or is paused: nobody would ever be let in.
     """
+    for run in find_running():
+        if run.endpoint == endpoint and run.is_paused:
+            raise GroundStationError(
+                f"{run.rig} is paused and takes nothing: let it go on by `kill -CONT {run.pid}`, "
+                "or by `fg` where it was started"
+            )
     try:
         with ZenohBus(endpoint) as bus:
             yield bus

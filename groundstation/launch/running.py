@@ -14,6 +14,9 @@ from pathlib import Path
 
 from groundstation.declarations.errors import GroundStationError, UsageError
 
+STOPPED = b"T"
+"""State of a process that a signal of job control has stopped, as proc(5) writes it."""
+
 
 @dataclass(frozen=True)
 class RunningRig:
@@ -30,6 +33,15 @@ class RunningRig:
     rig: str
     endpoint: str
     vehicles: tuple[str, ...]
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether its process stands still (Ctrl-Z, SIGSTOP): then nothing that it is asked is answered."""
+        try:
+            status = Path(f"/proc/{self.pid}/stat").read_bytes()
+        except OSError:  # it has ended, or this system shows no states
+            return False
+        return status.rpartition(b")")[2].split()[:1] == [STOPPED]  # a name may hold brackets itself
 
     def announce(self) -> Path:
         """Write the file that others find this run by.
