@@ -14,6 +14,8 @@ from groundstation.launch.live_run import LiveRun
 
 REFRESH_S = 0.25
 LINE_EVERY_S = 2.0
+WAKING_S = 2.0
+"""A run that has stood still goes on for so long at least: its processes find each other again."""
 
 
 def never() -> bool:
@@ -38,7 +40,10 @@ class _Ending:
 def run_live(
     live: LiveRun, duration: float | None, *, headless: bool, is_over: Callable[[], bool] = never
 ) -> None:
-    """Run until somebody asks for the end, for a time after all is ready, or until it is over."""
+    """Run until somebody asks for the end, for a time after all is ready, or until it is over.
+
+    Time in which the process stood still (Ctrl-Z and fg) does not count.
+    """
     ending = _Ending()
     console = Console()
     view = TerminalView(live, console)
@@ -58,8 +63,10 @@ def run_live(
             return
         with keys, view.opened(headless=headless, keys=HELP if keys.are_read else ""):
             while not ending.asked:
-                live.step(REFRESH_S)
+                stood_s = live.step(REFRESH_S)
                 now_s = time.monotonic()
+                if until_s is not None and stood_s:
+                    until_s = max(until_s + stood_s, now_s + WAKING_S)
                 if until_s is None and (duration is not None or is_over is not never):
                     live.check_start()
                     if live.is_ready and duration is not None:

@@ -1,5 +1,6 @@
 """A whole live run of a rig: launcher, monitor and latency; what the terminal view looks at."""
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -28,6 +29,8 @@ MOST_BATCHES = 4096
 """Of record streams, half a minute's; a launcher that is kept from looking for longer loses the oldest."""
 READY_S = 2 * START_S
 """What is not ready by then never will be: the laboratory has its time, then its processes have theirs."""
+STOOD_STILL_S = 2.0
+"""It looks twenty times a second; a busy machine keeps it from that for less, a pause (Ctrl-Z) for longer."""
 PROCESS = LAUNCHER
 """Whose record stream the latency is in."""
 
@@ -79,6 +82,7 @@ class LiveRun:
         self._latched: dict[tuple[str, str], int] = {}
         self._sequence = 0
         self._latency_due_s = 0.0
+        self._looked_s = math.inf  # never yet
         self._starting = RunningTime()
         self._announcement: Path | None = None
 
@@ -98,10 +102,12 @@ class LiveRun:
         assert bus is not None
         self._batches = bus.collect(f"{RECORD}/*", MOST_BATCHES)
 
-    def step(self, duration_s: float) -> None:
-        """Supervise and take what is published for a while."""
+    def step(self, duration_s: float) -> float:
+        """Supervise and take what is published for a while; return how long the process stood still, s."""
         until_s = time.monotonic() + duration_s
+        stood_s = 0.0
         while (now_s := time.monotonic()) < until_s:
+            stood_s += self._note_pause(now_s)
             self._take()
             self.launcher.supervise()
             if now_s >= self._latency_due_s:
@@ -109,6 +115,7 @@ class LiveRun:
                 self._publish_latency()
                 self.monitor.look(time.monotonic_ns())
             time.sleep(min(POLL_S, max(until_s - time.monotonic(), 0.0)))  # all at once costs least
+        return stood_s + self._note_pause(now_s)
 
     def check_start(self) -> None:
         """Call where nobody watches who could end a run that does not get ready.
@@ -125,6 +132,17 @@ class LiveRun:
         if self._announcement is not None:
             self._announcement.unlink(missing_ok=True)
         self.launcher.close()
+
+    def _note_pause(self, now_s: float) -> float:
+        """How long the process stood still before this look, s; 0 where it did not. It goes to the events."""
+        still_s, self._looked_s = now_s - self._looked_s, now_s
+        if still_s < STOOD_STILL_S:
+            return 0.0
+        self.monitor.note(
+            f"the run stood still for {still_s:.1f} s, paused or kept from the processor: "
+            "its processes heard nothing of each other"
+        )
+        return still_s
 
     def _take(self) -> None:
         """Let the monitor have what has come; each batch is a sign of life."""

@@ -1,6 +1,8 @@
 """A live run that does not become ready ends with a sentence where nobody watches it."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
 
 import pytest
 
@@ -21,13 +23,29 @@ def live(tmp_path):
 def clock(monkeypatch):
     class Clock:
         now_s = 100.0
+        sleeps = 0
+        pauses_s: ClassVar = {}
 
         def monotonic(self):
             return self.now_s
 
+        def monotonic_ns(self):
+            return round(self.now_s * 1e9)
+
+        def sleep(self, for_s):
+            self.sleeps += 1
+            self.now_s += for_s + self.pauses_s.get(self.sleeps, 0.0)
+
     clock = Clock()
     monkeypatch.setattr(live_run, "time", clock)
     return clock
+
+
+@pytest.fixture
+def alone(live):
+    """A run whose launcher has nothing to look after."""
+    live.launcher = SimpleNamespace(supervise=lambda: None, bus=None)
+    return live
 
 
 def wait(live, clock, for_s):
@@ -52,3 +70,28 @@ def test_a_run_that_is_ready_waits_for_nothing(live, clock):
     for child in live.launcher.children:
         child.is_ready = True
     wait(live, clock, 2 * READY_S)
+
+
+STOOD = "the run stood still for 60."
+
+
+@pytest.mark.parametrize("sleep", [1, 3, 5])
+def test_a_pause_is_noted_and_told_wherever_in_a_step_it_comes(alone, clock, sleep):
+    clock.pauses_s = {sleep: 60.0}
+    assert alone.step(0.25) == pytest.approx(60.0, abs=0.1)
+    assert [line for line in alone.monitor.lines if STOOD in line]
+    assert alone.step(0.25) == 0.0
+    assert len([line for line in alone.monitor.lines if STOOD in line]) == 1
+
+
+def test_a_pause_between_two_steps_is_noted_too(alone, clock):
+    assert alone.step(0.25) == 0.0
+    clock.now_s += 60.0
+    assert alone.step(0.25) == pytest.approx(60.0, abs=0.1)
+
+
+def test_what_came_before_the_first_look_and_a_busy_machine_are_no_pause(alone, clock):
+    clock.now_s += 60.0
+    clock.pauses_s = {2: 1.0, 6: 1.9}
+    assert alone.step(0.25) == alone.step(0.25) == alone.step(0.25) == 0.0
+    assert not [line for line in alone.monitor.lines if "stood still" in line]
