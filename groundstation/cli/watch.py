@@ -88,15 +88,21 @@ def _run_of(topic: str, runs: list[RunningRig]) -> RunningRig:
 
 
 class _Csv:
-    """Lines of CSV, each flushed: whoever reads them reads them now."""
+    """Lines of CSV, each flushed: whoever reads them reads them now.
+
+    The names come with the first line: a rig that is not reached leaves an empty file.
+    """
 
     def __init__(self, pick: Pick) -> None:
         self._pick = pick
         self._out = csv.writer(sys.stdout, lineterminator="\n")
-        self._put([STAMP, *(column.name for column in pick.columns)])
+        self._has_head = False
 
     def write(self, message: Message) -> None:
         """Write a message."""
+        if not self._has_head:
+            self._has_head = True
+            self._put([STAMP, *(column.name for column in self._pick.columns)])
         values = (shown(column.value(message), exact=True) for column in self._pick.columns)
         self._put([stamp_text(message.stamp_ns), *values])
 

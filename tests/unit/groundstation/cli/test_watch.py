@@ -10,8 +10,10 @@ import threading
 
 import pytest
 
+from groundstation.cli.main import call
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.lease import Lease
+from groundstation.launch.running import RunningRig
 from groundstation.parts.fusion.messages import VehicleState
 
 
@@ -132,6 +134,15 @@ def test_a_wrong_name_is_one_sentence_that_names_near_ones(fake_run, groundstati
     with pytest.raises(UsageError) as refusal:
         groundstation("watch", topic)
     assert words in str(refusal.value)
+
+
+def test_a_rig_that_is_not_reached_leaves_no_output(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    RunningRig(os.getpid(), "gone", "tcp/127.0.0.1:9", ("alpha",)).announce()
+    assert call(["watch", "alpha/state"]) == 1
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "the hub at tcp/127.0.0.1:9 cannot be reached" in shown.err
 
 
 def test_where_no_rig_runs_it_says_so(tmp_path, monkeypatch, groundstation):
