@@ -21,7 +21,6 @@ from groundstation.declarations.rig import Rig
 from groundstation.launch.attendant import Attendant
 from groundstation.launch.onlooker import look_on
 from groundstation.launch.orders import Orders
-from groundstation.launch.process import obey
 from groundstation.parts.fusion.messages import VehicleState
 from groundstation.recording.channel_names import channel_name
 from groundstation.rig.read import parse_rig
@@ -113,16 +112,11 @@ class FoxgloveServer:
 def attendant(port: int) -> Attendant:
     """The server as the launcher runs it."""
     greeting = (f"{FOXGLOVE}: ws://{HOST}:{port}",)
-    return Attendant(FOXGLOVE, f"{__name__}:main", port, greeting)
-
-
-def main(orders: Orders) -> None:
-    """Serve; what the launcher's attendant calls."""
-    obey(run, orders)
+    return Attendant(FOXGLOVE, f"{__name__}:run", port, greeting)
 
 
 def run(orders: Orders) -> None:
-    """Serve until asked to stop.
+    """Serve until asked to stop; what the launcher's attendant calls.
 
     Raises:
         UsageError: The port is taken.

@@ -33,7 +33,6 @@ from groundstation.declarations.names import ROS2
 from groundstation.launch.attendant import Attendant
 from groundstation.launch.onlooker import look_on
 from groundstation.launch.orders import Orders
-from groundstation.launch.process import obey
 from groundstation.recording.channel_names import channel_name
 from groundstation.rig.read import parse_rig
 
@@ -187,16 +186,11 @@ class _Bridge:
 
 def attendant(told: Told) -> Attendant:
     """The bridge as the launcher runs it."""
-    return Attendant(ROS2, f"{__name__}:main", told)
-
-
-def main(orders: Orders) -> None:
-    """Bridge; what the launcher's attendant calls."""
-    obey(run, orders)
+    return Attendant(ROS2, f"{__name__}:run", told)
 
 
 def run(orders: Orders) -> None:
-    """Bridge until asked to stop."""
+    """Bridge until asked to stop; what the launcher's attendant calls."""
     rig = parse_rig(orders.rig_text, orders.rig_path, orders.files)
     payloads = rig.tables.payloads
     assert orders.attendant is not None

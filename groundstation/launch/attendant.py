@@ -29,7 +29,9 @@ class Attendant:
 
 
 def run(orders: Orders) -> None:
-    """Run an attendant; what the fork server calls."""
+    """Run an attendant; what the fork server calls. What it cannot do it says in a sentence, and ends."""
+    from groundstation.launch.process import obey  # much, and of this process alone
+
     assert orders.attendant is not None
     module, _, function = orders.attendant.target.partition(":")
-    getattr(importlib.import_module(module), function)(orders)
+    obey(getattr(importlib.import_module(module), function), orders)

@@ -76,6 +76,7 @@ def test_a_scenario_that_is_paused_and_continued_has_a_verdict_and_no_process_wa
     code, said = run.ends_by_itself()
     assert code in (0, 1), said
     assert "verdict: " in said
+    assert "the run stood still for" in said
     assert "Traceback" not in said
     assert "starting it again" not in said
     assert "no sign of life" not in said
