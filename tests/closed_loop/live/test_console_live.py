@@ -15,6 +15,7 @@ def flight(launch, two_drawn):
     run = launch(two_drawn, has_console=True)
     line = run.wait_for("console: http://127.0.0.1:")
     run.address = re.search(r"http://\S+", line)[0]
+    run.rewind()  # on a busy machine they fly before the console is ready
     run.wait_until_flying()
     return run
 
