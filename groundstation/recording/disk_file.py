@@ -1,5 +1,6 @@
 """The file that a recording is written to: it says in a sentence why it takes no more."""
 
+import errno
 import io
 import os
 from collections.abc import Iterator
@@ -7,21 +8,25 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NoRoomError, RecordingError
+from groundstation.recording.file_place import place_of
 from groundstation.recording.run_files import SUFFIX, part_of
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
 def free_bytes(path: Path) -> int:
-    """On the disk of a file, for whoever is not root.
+    """On the disk where a new file would be, for whoever is not root; folders that are not there are made.
 
     Raises:
-        RecordingError: Its folder is gone.
+        RecordingError: The disk is gone.
     """
     with on_disk(path):
-        found = os.statvfs(path.parent)
+        found = os.statvfs(next(parent for parent in path.absolute().parents if parent.exists()))
     return found.f_bavail * found.f_frsize
 
 
@@ -33,6 +38,29 @@ class DiskFile(io.FileIO):
     """
 
     _is_torn = False
+
+    def free_bytes(self) -> int:
+        """On its own disk, whatever its path leads to by now, for whoever is not root.
+
+        Raises:
+            RecordingError: The disk is gone.
+        """
+        with on_disk(Path(str(self.name))):
+            found = os.fstatvfs(self.fileno())
+        return found.f_bavail * found.f_frsize
+
+    def place(self, supposed: Path) -> Path:
+        """A path that leads to it now.
+
+        Args:
+            supposed: Where it was last.
+
+        Raises:
+            LostFileError: There is none.
+            RecordingError: Its disk is gone.
+        """
+        with on_disk(supposed):
+            return place_of(self.fileno(), supposed)
 
     def write(self, data: "ReadableBuffer", /) -> int:
         left, start = memoryview(data), self.tell()
@@ -58,12 +86,14 @@ def on_disk(path: Path) -> Iterator[None]:
     """Write to a disk.
 
     Raises:
-        RecordingError: It is full, or gone.
+        NoRoomError: It is full.
+        RecordingError: It is gone.
     """
     try:
         yield
     except OSError as error:
-        raise RecordingError(f"{path} cannot be written any further: {error.strerror or error}") from error
+        kind = NoRoomError if error.errno in _FULL else RecordingError
+        raise kind(f"{path} cannot be written any further: {error.strerror or error}") from error
 
 
 def check_new_recording(path: Path) -> None:

@@ -6,7 +6,19 @@ class RecordingError(Exception):
 
 
 class NoRoomError(RecordingError):
-    """The disk of a recording is nearly full; what was written so far is whole."""
+    """The disk of a recording is full, or nearly so."""
+
+
+class LostFileError(RecordingError):
+    """What was written to a file cannot be reached by any name; it is noticed while it is written."""
+
+
+class DeletedFileError(LostFileError):
+    """A file has no name any more: what was written to it is lost."""
+
+
+class UnreachableFileError(LostFileError):
+    """A file lies on a disk that was unmounted, or over which another lies: what it holds is there."""
 
 
 class UnknownTopicError(RecordingError, KeyError):

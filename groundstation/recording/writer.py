@@ -26,10 +26,11 @@ from groundstation.declarations.message import Message
 from groundstation.recording.channel_names import channel_name
 from groundstation.recording.disk_file import DiskFile, free_bytes, on_disk, open_new
 from groundstation.recording.errors import NoRoomError, RecordingError
+from groundstation.recording.file_place import finished_name
 from groundstation.recording.info import METADATA_NAME, RecordingInfo
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.policy import is_kept
-from groundstation.recording.run_files import part_of
+from groundstation.recording.run_files import next_name, part_of
 from groundstation.recording.software import software
 
 FLUSH_PERIOD_NS = 250_000_000
@@ -60,7 +61,7 @@ class Recorder:
 
     Attributes:
         path: Of the finished file.
-        part_path: Of the file until then.
+        part_path: Of the file until then; both follow a file that is moved.
         message_count: Messages written or in the open chunk.
         latched: The newest latched messages of the record stream, by noun and owner: a file that goes on from
             here begins with them.
@@ -107,6 +108,7 @@ class Recorder:
         self._repeat_due_ns = 0
         self._stated: dict[str, str] | None = info.to_metadata()
         """What the file states about itself, until the second copy is written."""
+        self._has_index = False
         self._file: DiskFile | None = open_new(path)
         try:
             self._writer = McapFile(self._file, profile="ros2", library=software())
@@ -127,6 +129,30 @@ class Recorder:
             return 0
         stated = self._stated or {}
         return self._writer.rest_bytes + sum(len(f"{key}{text}".encode()) + 8 for key, text in stated.items())
+
+    @property
+    def free_bytes(self) -> int:
+        """On the disk of the file.
+
+        Raises:
+            RecordingError: It is gone.
+        """
+        return free_bytes(self.path) if self._file is None else self._file.free_bytes()
+
+    def check_place(self) -> bool:
+        """Look where the file is, by two system calls; return whether it was moved since.
+
+        Raises:
+            LostFileError: It was deleted, or no path leads to it any more.
+            RecordingError: Its disk is gone.
+        """
+        if self._file is None:
+            return False
+        place = self._file.place(self.part_path)
+        if place == self.part_path:
+            return False
+        self.part_path, self.path = place, finished_name(place)
+        return True
 
     def record(self, delivered: Delivered, now_ns: int) -> None:
         """Write one message.
@@ -193,17 +219,37 @@ class Recorder:
             self._flush()
 
     def finish(self) -> Path:
-        """Write the index and give the file its final name; may be called twice."""
+        """Write the index and give the file its final name, wherever it is by now; may be called again.
+
+        Returns:
+            Where it is.
+
+        Raises:
+            LostFileError: It was deleted; or it is complete, but no path leads to it any more.
+            RecordingError: The disk is full, or gone.
+        """
         if self._file is not None:
-            self._writer.flush()
-            self._state_again()
-            self._writer.finish()
+            if not self._has_index:
+                self._writer.flush()
+                self._state_again()
+                self._writer.finish()
+                self._has_index = True
             with on_disk(self.part_path):
                 os.fsync(self._file.fileno())
+            self.check_place()
+            with on_disk(self.part_path):
+                if self.path != self.part_path:
+                    if self.path.exists():  # it was not when this recording began
+                        self.path = next_name(self.path)
+                    self.part_path.rename(self.path)
                 self._file.close()
-                self._file = None
-                self.part_path.replace(self.path)
+            self._file = None
         return self.path
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the index is written: with it the file can be read under any name."""
+        return self._has_index
 
     def end_early(self) -> int:
         """Finish without what a full disk has not taken; return how many messages that costs.
@@ -225,10 +271,13 @@ class Recorder:
     def discard(self) -> None:
         """Leave no file: for derived recordings whose making failed; does nothing after ``finish``."""
         if self._file is not None:
-            with contextlib.suppress(RecordingError):  # what is still buffered is not wanted any more
+            with contextlib.suppress(RecordingError):  # it is gone already
+                self.check_place()
+                with on_disk(self.part_path):
+                    self.part_path.unlink()
+            with contextlib.suppress(RecordingError), on_disk(self.part_path):
                 self._file.close()
             self._file = None
-            self.part_path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self
@@ -260,7 +309,7 @@ class Recorder:
     def _flush(self) -> None:
         self._flush_due_ns = None
         if self._spare_bytes:
-            self.check_room(free_bytes(self.part_path))
+            self.check_room(self.free_bytes)
         self._writer.flush()
         if self._has_new_channels or self._newest_ns >= self._repeat_due_ns:
             wait_ns = SECOND_COPY_NS if self._has_new_channels else REPEAT_NS

@@ -130,7 +130,7 @@ def test_a_recording_that_a_full_disk_lets_nobody_begin_leaves_no_file(tmp_path)
     )
     assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1] == (
-        "groundstation.recording.errors.RecordingError: "
+        "groundstation.recording.errors.NoRoomError: "
         f"{tmp_path / 'run.mcap.part'} cannot be written any further: File too large"
     )
     assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ from groundstation.launch.recorder import write_until_end
 from groundstation.launch.recorder_pause import ROOM_AGAIN_BYTES, SPARE_BYTES, Pause
 from groundstation.launch.recorder_reporter import RecorderReporter
 from groundstation.parts.operation.messages import Latency
-from groundstation.recording import disk_file, writer
+from groundstation.recording import disk_file
 from groundstation.recording.errors import NoRoomError, RecordingError
 from groundstation.recording.reader import Recording
 from groundstation.recording.run_files import next_name
@@ -86,7 +86,7 @@ def test_what_a_full_disk_has_taken_is_whole_and_is_finished_when_there_is_room_
 
 def test_a_recording_that_ends_in_time_is_whole(tmp_path, monkeypatch):
     free = SPARE_BYTES + 60_000
-    monkeypatch.setattr(writer, "free_bytes", lambda _path: free - recorder.written_bytes)
+    monkeypatch.setattr(disk_file.DiskFile, "free_bytes", lambda file: free - file.tell())
     recorder = Recorder(tmp_path / "run.mcap", INFO, spare_bytes=SPARE_BYTES)
     assert len(fill(recorder)) > 100
     with pytest.raises(NoRoomError, match="the disk is full"):
