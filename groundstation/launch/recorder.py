@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from groundstation.bus.record_stream import BatchError, RecordWriter, read_batch
 from groundstation.bus.zenoh_bus import RECORD, ZenohBus
@@ -15,9 +16,9 @@ from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.declarations.message import Message
 from groundstation.launch.orders import Orders
 from groundstation.launch.process import NICENESS, obey, stop_when_asked
-from groundstation.launch.recorder_pause import ALIVE_PERIOD_NS, SPARE_BYTES, Pause
+from groundstation.launch.recorder_pause import ALIVE_PERIOD_NS, RETRY_NS, SPARE_BYTES, Pause
 from groundstation.launch.recorder_reporter import RecorderReporter
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NoRoomError, RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.run_files import next_name
 from groundstation.recording.writer import Recorder
@@ -37,8 +38,9 @@ def main(orders: Orders) -> None:
 def run(orders: Orders) -> None:
     """Record until asked to stop; what is still in the queue then is written too.
 
-    A disk that is full ends a file, not the process: the flight is told, and recording goes on in another
-    file when there is room again. Where the rig splits recordings, another file goes on without a gap.
+    A disk that is full, or a file that is lost, ends a file, not the process: the flight is told, and
+    recording goes on in another file when there can be one. A file that is moved is followed. Where the rig
+    splits recordings, another file goes on without a gap.
 
     Raises:
         UsageError: The file cannot be begun.
@@ -61,10 +63,11 @@ def run(orders: Orders) -> None:
         bus.subscribe(f"{RECORD}/*", lambda _key, batch, _attachment: batches.put(batch))
         reporter.look(time.monotonic_ns())
         bus.announce(orders.process)
-        trouble = ""
+        pauses: list[_Told] = []
         is_over = False
         while not is_over:
-            until_ns = None if split_ns is None else time.monotonic_ns() + split_ns
+            asked, began_ns = recorder.path, time.monotonic_ns()
+            until_ns = None if split_ns is None else began_ns + split_ns
             try:
                 with in_a_sentence(recorder):
                     is_over = write_until_end(
@@ -73,20 +76,48 @@ def run(orders: Orders) -> None:
                     following = None if is_over else begin(next_name(orders.recording), recorder)
                     _finish(recorder, following)
             except GroundStationError as error:
-                reason = str(error)
-                pause = Pause(recorder, orders.recording, begin)
-                _complain(f"{reason} {pause.words()}")
-                reporter.stall()
+                is_full = isinstance(error.__cause__, NoRoomError)
+                pause = Pause(
+                    recorder,
+                    orders.recording,
+                    partial(begin, before=recorder),
+                    is_full=is_full,
+                    at_once=not is_full and time.monotonic_ns() - began_ns >= RETRY_NS,
+                )
+                sentence = f"{error} {pause.words()}"
+                pauses.append(_Told(str(error), pause, sentence))
+                _complain(sentence)
+                reporter.stall(sentence, is_full=is_full)
                 following = None if is_over else pause.wait(batches, bus, orders.process, reporter)
-                trouble = f"{reason} {pause.words()}"  # it may have become whole meanwhile
                 if following is not None:
                     _complain(f"recording goes on in {following.path}")
             if following is None:
                 break
             recorder = following
             reporter.go_on(recorder)
-        if trouble:
-            raise GroundStationError(trouble)
+        if recorder.path != asked and recorder.path.is_file():
+            _complain(f"{recorder.path} is complete")
+        if pauses:
+            raise GroundStationError(_what_became(pauses))
+
+
+class _Told(NamedTuple):
+    """A file that took no more: why, what became of it, and what was said of that."""
+
+    reason: str
+    pause: Pause
+    sentence: str
+
+
+def _what_became(pauses: list[_Told]) -> str:
+    """What became of the last file that took no more; where it has changed, earlier ones are named again."""
+    for told in pauses:
+        told.pause.try_to_finish()
+    *earlier, last = [told._replace(sentence=f"{told.reason} {told.pause.words()}") for told in pauses]
+    for told, before in zip(earlier, pauses, strict=False):
+        if told.sentence != before.sentence:
+            _complain(told.sentence)
+    return last.sentence
 
 
 def begin_file(
@@ -166,6 +197,7 @@ def write_until_end(
         Whether the queue held None.
 
     Raises:
+        LostFileError: With a reporter: the file was deleted, or no path leads to it any more.
         RecordingError: The disk is full, or gone; with a reporter while there is room to finish the file.
     """
     sign_due_ns = 0
@@ -180,6 +212,8 @@ def write_until_end(
         if reporter is not None:
             status = reporter.look(now_ns)
             if status is not None:
+                if recorder.check_place():
+                    _complain(f"the recording was moved: it goes on in {recorder.part_path}")
                 recorder.check_room(status.free_bytes)
         try:
             batch = batches.get(timeout=TICK_S)

@@ -102,6 +102,9 @@ def _unseen_leader(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:
 
 
 def _station(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:
+    is_full, is_silent = seen.recorder_room_s == 0.0, seen.is_silent(seen.recorder_ns, RECORDER_S, now_ns)
+    if seen.recorder_trouble and not is_full and not is_silent:  # that has a row of its own
+        yield "recording_lost", seen.recorder_trouble
     if seen.memory_trouble and now_ns - seen.memory_ns < FORGETTING_S * NS_PER_S:
         yield "memory_lost", seen.memory_trouble
     if seen.late_s < -0.5 or seen.late_s > STOOD_STILL_S:

@@ -77,6 +77,7 @@ class Sightings:
         rest_s: Length of its unbroken rest.
         recorder_ns: Arrival of the recorder's newest status; None where none was ever received.
         recorder_room_s: How long the recording can go on by the room on its disk.
+        recorder_trouble: What the recorder has lost, or why it writes nothing; empty where all is well.
         demand_ns: Arrival of the controller's newest demand; None where none was ever received.
         outside_trouble: Whose program outside has the vehicle and is silent, and why; empty where none is.
         memory_trouble: Why the memory could not be written; empty if it never failed.
@@ -107,6 +108,7 @@ class Sightings:
     rest_s: float = 0.0
     recorder_ns: int | None = None
     recorder_room_s: float = math.inf
+    recorder_trouble: str = ""
     demand_ns: int | None = None
     outside_trouble: str = ""
     memory_trouble: str = ""

@@ -8,6 +8,7 @@ from groundstation.control.vehicle import VehicleModel
 from groundstation.control.wrench_envelope import WrenchEnvelope
 from groundstation.declarations.lease import FREE_FOR_ALL, Lease, LeaseCheck
 from groundstation.declarations.message import Message
+from groundstation.declarations.names import RECORDER
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Ack, ArgumentError, Request, answer, shown_name
 from groundstation.parts.control.messages import ControlStatus, Wrench
@@ -31,6 +32,8 @@ from groundstation.supervision.supervisor import Ruling, Supervisor
 
 PERIOD_NS = 20_000_000
 REPEAT_NS = 100_000_000
+_ALSO_OF_THE_RIG = (StopPress, Diagnostics)
+"""The recorder reports for all vehicles."""
 
 
 class SupervisorNode(Node):
@@ -77,7 +80,7 @@ class SupervisorNode(Node):
     def sources(self, payload: type[Message]) -> tuple[str, ...]:
         if payload is VehicleState:
             return (self.vehicle, *self._others)
-        return (self.vehicle, "") if payload is StopPress else (self.vehicle,)
+        return (self.vehicle, "") if payload in _ALSO_OF_THE_RIG else (self.vehicle,)
 
     def start(self, now_ns: int) -> Iterator[Message]:
         self._supervisor.sightings.began_ns = now_ns  # and no ruling before it has remembered
@@ -139,6 +142,8 @@ class SupervisorNode(Node):
                 sightings.neighbours = message.neighbours
             case Diagnostics() if message.level and message.node == f"{self.vehicle}/memory":
                 sightings.memory_trouble, sightings.memory_ns = message.summary, now_ns
+            case Diagnostics() if message.node == RECORDER:
+                sightings.recorder_trouble = message.summary if message.level else ""
             case ValveShares():
                 envelope = WrenchEnvelope(self._model, health_of(message.open_ratio, message.shut_ratio))
                 sightings.braking_m_s2 = braking_to_count_on(self._model, envelope)

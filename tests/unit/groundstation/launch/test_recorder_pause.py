@@ -2,6 +2,7 @@
 
 import errno
 import itertools
+import math
 import os
 import queue
 
@@ -126,6 +127,57 @@ def test_asked_to_end_it_ends_and_leaves_no_litter(tmp_path):
     assert pause.wait(waiting, Bus(), "recorder", RecorderReporter(recorder, Bus(), "recorder")) is None
     assert pause.words() == f"{tmp_path / 'run.mcap'} is not begun"
     assert not list(tmp_path.iterdir()), "a recording without a message leaves no file"
+
+
+def test_a_file_that_was_deleted_is_never_called_complete(tmp_path):
+    recorder = Recorder(tmp_path / "run.mcap", INFO)
+    record(recorder, 1, 2)
+    recorder.part_path.unlink()
+    pause = Pause(recorder, tmp_path / "run.mcap", begin, is_full=False)
+    assert pause.words() == "What it held is lost."
+    following = pause.try_to_go_on()
+    assert following.path == tmp_path / "run_1.mcap"
+    following.discard()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_complete_file_that_goes_later_is_not_called_complete_any_more(tmp_path):
+    recorder = Recorder(tmp_path / "run.mcap", INFO)
+    record(recorder, 1)
+    pause = Pause(recorder, tmp_path / "run.mcap", begin)
+    assert pause.words() == f"{tmp_path / 'run.mcap'} is complete up to here"
+    (tmp_path / "run.mcap").rename(tmp_path / "other.mcap")
+    assert pause.words() == f"{tmp_path / 'run.mcap'} was complete and is gone since"
+
+
+def test_where_the_folder_was_moved_recording_goes_on_where_it_was_asked_for(tmp_path):
+    (tmp_path / "a").mkdir()
+    recorder = Recorder(tmp_path / "a" / "run.mcap", INFO)
+    record(recorder, 1)
+    (tmp_path / "a").rename(tmp_path / "b")
+    pause = Pause(recorder, tmp_path / "a" / "run.mcap", begin)
+    assert pause.words() == f"{tmp_path / 'b' / 'run.mcap'} is complete up to here"
+    following = pause.try_to_go_on()
+    record(following, 2)
+    assert sequences(following.finish()) == [2]
+    assert sequences(tmp_path / "b" / "run.mcap") == [1]
+
+
+def test_a_next_file_that_need_not_be_waited_for_loses_nothing_that_waits(tmp_path):
+    recorder = Recorder(tmp_path / "run.mcap", INFO)
+    record(recorder, 1)
+    recorder.part_path.unlink()
+    bus, waiting = Bus(), queue.SimpleQueue()
+    waiting.put(batch_of(2))
+    reporter = RecorderReporter(recorder, bus, "recorder")
+    pause = Pause(recorder, tmp_path / "run.mcap", begin, is_full=False, at_once=True)
+    reporter.stall("run.mcap.part was deleted", is_full=False)
+    following = pause.wait(waiting, bus, "recorder", reporter)
+    assert [health.summary for _, health in bus.health] == ["run.mcap.part was deleted"]
+    assert bus.at_once[0][1].room_s == math.inf, "there is room"
+    waiting.put(None)
+    write_until_end(following, waiting, bus, "recorder", PAYLOADS)
+    assert sequences(following.finish()) == [2]
 
 
 def test_a_name_that_is_taken_is_never_written_over(tmp_path):

@@ -10,8 +10,8 @@ from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import RecordWriter, read_batch
 from groundstation.launch.recorder import write_until_end
 from groundstation.launch.recorder_pause import SPARE_BYTES
-from groundstation.launch.recorder_reporter import RATE_WINDOW_NS, RecorderReporter
-from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.launch.recorder_reporter import RATE_WINDOW_NS, TOLD_NS, RecorderReporter
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.recording.errors import RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
@@ -26,11 +26,14 @@ class Bus:
     """Keeps what is published."""
 
     def __init__(self):
-        self.at_once, self.batches = [], []
+        self.at_once, self.health, self.batches = [], [], []
 
     def put(self, topic, owner, encoded, attachment):
         envelope = Envelope.of_attachment(topic, owner, attachment)
-        self.at_once.append((envelope, codec_of(RecorderStatus).decode(encoded)))
+        if topic is Diagnostics.TOPIC:
+            self.health.append((envelope, codec_of(Diagnostics).decode(encoded)))
+        else:
+            self.at_once.append((envelope, codec_of(RecorderStatus).decode(encoded)))
 
     def publish_batch(self, process, batch):
         self.batches.append((process, batch))
@@ -63,8 +66,44 @@ def test_it_reports_at_once_and_twice_a_second_on_its_own_key_and_to_be_recorded
     assert first.room_s == math.inf
     recorded = [entry for process, batch in bus.batches for entry in read_batch(batch)]
     assert [(entry.noun, entry.owner, entry.sequence) for entry in recorded] == [
-        ("recorder_status", "", number) for number in (101, 102, 103, 104)
+        ("recorder_status", "", 101),
+        ("diagnostics", "recorder", 101),
+        ("recorder_status", "", 102),
+        ("recorder_status", "", 103),
+        ("diagnostics", "recorder", 102),
+        ("recorder_status", "", 104),
     ]
+    assert {(health.level, health.summary) for _, health in bus.health} == {(0, "")}
+
+
+def test_what_was_lost_is_told_at_once_and_for_some_seconds_after_recording_goes_on(tmp_path, monkeypatch):
+    now_ns = SECOND_NS
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns)
+    bus = Bus()
+    with Recorder(tmp_path / "run.mcap", INFO) as recorder:
+        reporter = RecorderReporter(recorder, bus, "recorder")
+        reporter.look(now_ns)
+        reporter.stall("it was deleted", is_full=False)
+        reporter.look(now_ns)
+        reporter.go_on(recorder)
+        for now_ns in (2 * SECOND_NS, SECOND_NS + TOLD_NS - 1, SECOND_NS + TOLD_NS, 2 * SECOND_NS + TOLD_NS):
+            reporter.look(now_ns)
+    told = [(health.level, health.summary) for _, health in bus.health]
+    assert told == [(0, ""), (2, "it was deleted"), (1, "it was deleted"), (1, "it was deleted"), (0, "")]
+
+
+def test_a_disk_that_is_gone_keeps_the_recorder_from_nothing_but_writing(tmp_path):
+    def gone(_recorder):
+        raise RecordingError("its disk is gone")
+
+    bus = Bus()
+    with Recorder(tmp_path / "run.mcap", INFO) as recorder:
+        reporter = RecorderReporter(recorder, bus, "recorder", free=gone)
+        with pytest.raises(RecordingError, match="is gone"):
+            reporter.look(0)
+        reporter.stall("its disk is gone", is_full=False)
+        assert reporter.look(0).free_bytes == 0
+    assert [health.summary for _, health in bus.health] == ["its disk is gone"]
 
 
 def test_the_room_is_what_is_free_at_the_rate_of_the_last_seconds(tmp_path):

@@ -115,6 +115,18 @@ class TestSilence:
         known.recorder_ns = 0
         assert set(found(known)) == {"recorder_down"}
 
+    @pytest.mark.parametrize("is_grounded", [True, False])
+    def test_what_the_recorder_has_lost_is_named_at_once(self, known, is_grounded):
+        known.began_ns = known.recorder_ns = 20 * S
+        known.recorder_trouble = "run.mcap.part was deleted"
+        assert found(known, is_grounded=is_grounded)["recording_lost"] == "run.mcap.part was deleted"
+
+    def test_a_disk_that_is_full_and_a_recorder_that_is_silent_are_not_named_twice(self, known):
+        known.recorder_ns, known.recorder_trouble, known.recorder_room_s = 20 * S, "it is full", 0.0
+        assert set(found(known)) == {"disk_low"}
+        known.recorder_room_s, known.recorder_ns = 1e6, 0
+        assert set(found(known)) == {"recorder_down"}
+
     def test_states_of_leaders_may_be_a_second_old(self, known, seen):
         known.neighbours = ("beta", "gamma", "delta")
         known.others = {"beta": seen(19 * S), "delta": seen(0), "other": seen(0)}

@@ -10,7 +10,7 @@ from groundstation.control.vehicle import VehicleModel, square_of_eight
 from groundstation.declarations.request import Ack, Request
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
-from groundstation.parts.operation.messages import RecorderStatus
+from groundstation.parts.operation.messages import Diagnostics, RecorderStatus
 from groundstation.parts.supervision.memory import text_of
 from groundstation.parts.supervision.messages import (
     Faults,
@@ -175,6 +175,18 @@ class TestWhatItSees:
         node.receive(RecorderStatus(0, "", "x.mcap", 1, 2, 77.0))
         assert (node.known.rest_s, node.known.fix_age_s) == (3.0, 0.7)
         assert (node.known.recorder_ns, node.known.recorder_room_s) == (5, 77.0)
+
+    def test_what_the_recorder_says_of_itself_and_nobody_else(self, node):
+        def hears_of(name, level, summary):
+            node.receive(Diagnostics(0, "", name, level, summary, (), ()))
+            return node.known.recorder_trouble
+
+        assert hears_of("outside", 1, "nobody is there") == ""
+        assert hears_of("recorder", 2, "x.mcap.part was deleted") == "x.mcap.part was deleted"
+        assert hears_of("recorder", 0, "") == ""
+
+    def test_diagnostics_of_the_rig_concern_every_vehicle(self, node):
+        assert node.node.sources(Diagnostics) == ("alpha", "")
 
     def test_fixes_agree_since_the_last_one_that_was_refused(self, node):
         agreeing = []
