@@ -174,8 +174,9 @@ def run(
         raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
     else:
         check_ports(hub_port, joined)
-    trouble = ""
+    trouble, lines = "", []
     with kept_in(record, loaded, text, loaded.name or file.stem) as (recording, folder):
+        firsts = [recording]
         try:
             if lockstep:
                 assert duration is not None
@@ -187,14 +188,14 @@ def run(
                     loaded, text, file, recording,
                     hub_port=hub_port, attendants=(*beside, *bridges), guests=joined,
                 )  # fmt: skip
+                firsts = live.recordings
                 run_live(live, duration, headless=headless or not sys.stdout.isatty())
-                faults, trouble = live.faults, live.launcher.recording_trouble
+                faults, trouble, lines = live.faults, live.recording_trouble, live.recorder_lines
         finally:
-            finished, torn = finished_files(recording)
-        for line in faults.lines():
+            finished, torn = finished_files(*firsts)
+        for line in (*lines, *faults.lines()):
             print(line)
-        if finished:
-            finish_folder(folder)
+        folder = finish_folder(folder, finished)
     if trouble or (torn and not finished):
         raise GroundStationError(trouble or f"no recording was finished: {torn[0]} is what is left")
     if report is not None:

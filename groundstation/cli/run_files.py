@@ -28,9 +28,15 @@ def check_recording(path: Path) -> None:
         raise UsageError(str(error)) from error
 
 
-def finished_files(recording: Path) -> tuple[list[Path], list[Path]]:
-    """Name the files of a run; a recorder that was started again left several. Finished ones, and others."""
-    finished, torn = run_of(recording)
+def finished_files(*firsts: Path) -> tuple[list[Path], list[Path]]:
+    """Name the files of a run; a recorder that was started again left several. Finished ones, and others.
+
+    Args:
+        firsts: Name of the first file, in each folder where the run was recorded.
+    """
+    found = [run_of(first) for first in firsts]
+    finished = [path for paths, _ in found for path in paths]
+    torn = [path for _, paths in found for path in paths]
     for path in finished:
         print(f"recording: {path}")
     for path in torn:
@@ -65,10 +71,23 @@ def kept_in(
         folder.discard_if_nothing_was_recorded()
 
 
-def finish_folder(folder: RunFolder | None, verdict: Verdict | None = None) -> None:
-    """Write numbers, verdict and markers of a run that has a folder, and name it."""
-    if folder is None:
-        return
+def finish_folder(
+    folder: RunFolder | None, finished: list[Path], verdict: Verdict | None = None
+) -> RunFolder | None:
+    """Write numbers, verdict and markers of a run that has a folder, and name it.
+
+    Args:
+        folder: As it was begun; None where a recording was named instead.
+        finished: Files of the run.
+        verdict: On the run, where a scenario was flown.
+
+    Returns:
+        The folder, where it is by now.
+    """
+    if folder is None or not finished:
+        return folder
+    if not folder.path.is_dir():
+        folder = RunFolder(finished[0].parent)  # it was moved in flight
     try:
         with RunProgress(1.0) as progress:
             missing = folder.finish(progress, verdict)
@@ -77,3 +96,4 @@ def finish_folder(folder: RunFolder | None, verdict: Verdict | None = None) -> N
     for sentence in missing:
         sys.stderr.write(f"groundstation: {sentence}\n")
     print(f"run: {folder.path}")
+    return folder

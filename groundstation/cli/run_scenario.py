@@ -110,20 +110,21 @@ def _flown(scenario: Scenario, asked: Asked, seed: int) -> Judged:
         scenario = scenario.started_by_hand()
     kept = kept_in(asked.record, scenario.rig, rig_text(scenario.rig), scenario.name, asked.text)
     with kept as (recording, folder):
+        firsts = [recording]
         try:
             if asked.lockstep:
                 with RunProgress(longest_s(scenario)) as progress:
                     judged, faults = fly_recorded(scenario, seed, recording, progress)
             else:
-                judged, faults, trouble = None, None, _fly_live(scenario, asked, recording)
+                judged, faults = None, None
+                trouble, firsts = _fly_live(scenario, asked, recording)
         finally:
-            finished, _ = finished_files(recording)
+            finished, _ = finished_files(*firsts)
         if judged is None:
             judged = judge_recordings(scenario, finished)
         for line in faults.lines() if faults is not None else ():
             print(line)
-        if finished:
-            finish_folder(folder, judged.verdict)
+        folder = finish_folder(folder, finished, judged.verdict)
     if trouble:
         raise GroundStationError(trouble)
     if asked.report is not None and finished:
@@ -169,8 +170,8 @@ class _Watch:
             self.live.monitor.note(text)
 
 
-def _fly_live(scenario: Scenario, asked: Asked, recording: Path) -> str:
-    """Fly in real time; what is wrong with the recording, empty if nothing is."""
+def _fly_live(scenario: Scenario, asked: Asked, recording: Path) -> tuple[str, list[Path]]:
+    """Fly in real time; what is wrong with the recording, empty if nothing is, and where its files are."""
     watch = _Watch()
     watch.live = LiveRun(
         scenario.rig,
@@ -182,9 +183,9 @@ def _fly_live(scenario: Scenario, asked: Asked, recording: Path) -> str:
     )
     headless = asked.headless or not sys.stdout.isatty()
     run_live(watch.live, None, headless=headless, is_over=lambda: watch.is_over)
-    for line in watch.live.faults.lines():
+    for line in (*watch.live.recorder_lines, *watch.live.faults.lines()):
         print(line)
-    return watch.live.launcher.recording_trouble
+    return watch.live.recording_trouble, watch.live.recordings
 
 
 def _print_verdict(judged: Judged) -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+import textwrap
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ app = typer.Typer(rich_markup_mode=None)
 LOOKS_S = 2.5
 """What is latched is repeated each second; who has published nothing by then has nothing to report."""
 _GAP = "  "
+_UNDER = 12 * " "
 
 
 @app.command()
@@ -61,7 +63,18 @@ def _look(run: RunningRig) -> dict[str, Any]:
     except GroundStationError as error:
         return asdict(run) | {"trouble": str(error)}
     known = {"pid": run.pid, "rig": run.rig, "endpoint": run.endpoint}
-    return known | glance.as_dict(time.monotonic_ns())
+    seen = glance.as_dict(time.monotonic_ns())
+    if seen["recorder"] is None and run.recording:
+        seen["recorder"] = _stopped(run)
+    return known | seen
+
+
+def _stopped(run: RunningRig) -> dict[str, Any]:
+    """What is known of a recorder that was asked for and reports nothing."""
+    newest = next((other for other in find_running() if other == run), run)  # than before the look
+    why = newest.recorder_stop or f"nothing has come from it within {LOOKS_S:g} s"
+    unknown = dict.fromkeys(("written_bytes", "free_bytes", "room_s"))
+    return {"is_stopped": True, "trouble": why, "path": run.recording, **unknown}
 
 
 def _lines(rig: dict[str, Any]) -> Iterator[str]:
@@ -81,6 +94,13 @@ def _whole_lines(rig: dict[str, Any]) -> Iterator[str]:
         return
     yield f"  control   {_control(rig['control'])}"
     yield f"  recorder  {_recorder(rig['recorder'])}"
+    if rig["recorder"] and rig["recorder"]["trouble"]:
+        yield from textwrap.wrap(
+            rig["recorder"]["trouble"],
+            shutil.get_terminal_size().columns,
+            initial_indent=_UNDER,
+            subsequent_indent=_UNDER,
+        )
     yield ""
     rows = [("", "mode", "air", "tank", "last fix", "light to valve, p50 / p99")]
     rows += [
@@ -120,6 +140,8 @@ def _control(control: dict[str, Any]) -> str:
 def _recorder(recorder: dict[str, Any] | None) -> str:
     if recorder is None:
         return "none"
+    if recorder["is_stopped"]:
+        return f"STOPPED: {recorder['path']}"
     room = recorder["room_s"]
     lasts = "" if room is None else f", room for {room / 3600:.3g} h"
     return (

@@ -14,6 +14,8 @@ REFUSAL = 2
 """Exit code of a child that cannot do what it is ordered; its last line on stderr gives the reason."""
 
 _READ_BYTES, _MOST_READS = 1 << 16, 16
+MOST_REMEMBERED = 256
+"""Lines and ends of a process, over all its lives."""
 
 
 class Process(Protocol):
@@ -50,6 +52,7 @@ class Child:
         has_been_ready: It has announced so once, in this life or an earlier one.
         restarts: How often it was started again.
         restart_at_s: When it is to be started again, on the monotonic clock; None while it runs.
+        history: Its newest lines on stderr and how its lives ended, with moments on the monotonic clock.
         last_sign_s: Its last sign of life, on the launcher's running time; None before the first.
         started_s: Of its present life, on the launcher's running time.
     """
@@ -69,6 +72,7 @@ class Child:
         self._complaints = Lines(None)
         self._unread: deque[str] = deque()
         self._last_words = ""
+        self.history: deque[tuple[float, str]] = deque(maxlen=MOST_REMEMBERED)
 
     @property
     def state(self) -> str:
@@ -147,6 +151,7 @@ class Child:
         wait_s = self._back_off_s
         self.restart_at_s = now_s + wait_s
         self._back_off_s = min(2 * wait_s, LAST_BACK_OFF_S)
+        self.history.append((now_s, self.how_it_ended()))
         self.is_ready = False
         return wait_s
 
@@ -182,6 +187,7 @@ class Child:
     def _read_complaints(self) -> None:
         lines = self._complaints.take()
         self._unread.extend(lines)
+        self.history.extend((time.monotonic(), line) for line in lines if line)
         self._last_words = next((line for line in reversed(lines) if line), self._last_words)
 
     def _close_pipes(self) -> None:

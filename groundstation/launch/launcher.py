@@ -147,10 +147,9 @@ class Launcher:
         return [line for name in ready for line in self._attendants[name].greeting]
 
     @property
-    def recording_trouble(self) -> str:
-        """Why the recording could not be written to its end; known after ``close``, empty where it could."""
-        child = self._children.get(RECORDER)
-        return child.last_words if child is not None and child.code == process.TROUBLE else ""
+    def recorder(self) -> Child | None:
+        """The process that records; None where no recording was asked for."""
+        return self._children.get(RECORDER)
 
     def received(self, name: str) -> None:
         """Note a sign of life of a process: a batch of its record stream."""

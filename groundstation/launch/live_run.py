@@ -4,10 +4,12 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
-from groundstation.bus.cdr import codec_of
+from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.envelope import Envelope
 from groundstation.bus.record_stream import BatchError, Recorded, RecordWriter, read_batch
 from groundstation.bus.zenoh_bus import RECORD, Mailbox, split_key
@@ -17,9 +19,10 @@ from groundstation.declarations.rig import Rig
 from groundstation.launch.attendant import Attendant
 from groundstation.launch.guests import Guests
 from groundstation.launch.launcher import START_S, Launcher
+from groundstation.launch.recorder_troubles import closing_lines, final_trouble, why_stopped
 from groundstation.launch.running import RunningRig
 from groundstation.launch.running_time import RunningTime
-from groundstation.parts.operation.messages import Latency
+from groundstation.parts.operation.messages import Latency, RecorderStatus
 from groundstation.watch.fault_summary import FaultSummary
 from groundstation.watch.monitor import Monitor
 
@@ -47,6 +50,9 @@ class LiveRun:
         hub_port: Of the hub on loopback; 0 for a free one.
         attendants: Processes beside the rig's.
         guests: Where programs of other hosts connect; None: nowhere.
+
+    Attributes:
+        recordings: Names of the first file, where it was asked for and in each folder to which it was moved.
     """
 
     def __init__(
@@ -61,7 +67,7 @@ class LiveRun:
         guests: Guests | None = None,
     ) -> None:
         self.rig = rig
-        self.recording = recording
+        self.recordings = [recording]
         self.monitor = Monitor(rig.tables, tuple(rig.vehicles))
         self.launcher = Launcher(
             rig,
@@ -75,8 +81,8 @@ class LiveRun:
         )
         self.started_s = time.monotonic()
         self.faults = FaultSummary(tuple(rig.vehicles), time.monotonic_ns())
-        self._watchers = watchers
-        self._nouns = frozenset(watchers) | frozenset(self.monitor.nouns)
+        self._watchers = {RecorderStatus.TOPIC.noun: self._see_recorder, **watchers}
+        self._nouns = frozenset(self._watchers) | frozenset(self.monitor.nouns)
         self._batches: Mailbox | None = None
         self._latching = {noun for noun, kind in rig.tables.payloads.items() if kind.TOPIC.latched}
         self._latched: dict[tuple[str, str], int] = {}
@@ -84,6 +90,7 @@ class LiveRun:
         self._latency_due_s = 0.0
         self._looked_s = math.inf  # never yet
         self._starting = RunningTime()
+        self._announced: RunningRig | None = None
         self._announcement: Path | None = None
 
     @property
@@ -91,13 +98,29 @@ class LiveRun:
         """Whether every process runs."""
         return self.launcher.is_ready
 
+    @property
+    def recording_trouble(self) -> str:
+        """Why the recording was not written to its end; known after ``close``, empty where it was."""
+        return final_trouble(self.launcher.recorder, self.started_s)
+
+    @property
+    def recorder_lines(self) -> list[str]:
+        """What else went wrong with the recorder, for people; complete after ``close``."""
+        return list(closing_lines(self.launcher.recorder, self.started_s))
+
     def start(self, is_unwanted: Callable[[], bool]) -> None:
         """Start everything, unless the end is asked for meanwhile."""
         if is_unwanted():
             return
         self.launcher.start()
-        run = RunningRig(os.getpid(), self.rig.name, self.launcher.endpoint, tuple(self.rig.vehicles))
-        self._announcement = run.announce()
+        self._announced = RunningRig(
+            os.getpid(),
+            self.rig.name,
+            self.launcher.endpoint,
+            tuple(self.rig.vehicles),
+            str(self.recordings[0].absolute()),
+        )
+        self._announcement = self._announced.announce()
         bus = self.launcher.bus
         assert bus is not None
         self._batches = bus.collect(f"{RECORD}/*", MOST_BATCHES)
@@ -110,6 +133,7 @@ class LiveRun:
             stood_s += self._note_pause(now_s)
             self._take()
             self.launcher.supervise()
+            self._announce_recorder()
             if now_s >= self._latency_due_s:
                 self._latency_due_s = now_s + LATENCY_PERIOD_S
                 self._publish_latency()
@@ -166,6 +190,24 @@ class LiveRun:
                     watch = self._watchers.get(entry.noun)
                     if watch is not None:
                         watch(entry)
+
+    def _see_recorder(self, entry: Recorded) -> None:
+        """Note where the recording is: its folder may be moved."""
+        try:
+            path = Path(codec_of(RecorderStatus).decode(entry.data).path)
+        except CodecError:
+            return  # it reports twice a second
+        moved = path.parent / self.recordings[0].name
+        if moved not in self.recordings:
+            self.recordings.append(moved)
+
+    def _announce_recorder(self) -> None:
+        """Let others know that no recorder runs, and why."""
+        run, stop = self._announced, why_stopped(self.launcher.recorder)
+        if run is not None and run.recorder_stop != stop:
+            self._announced = replace(run, recorder_stop=stop)
+            with suppress(GroundStationError):  # a folder that is gone ends no flight
+                self._announced.announce()
 
     def _is_repeated(self, entry: Recorded) -> bool:
         """Whether it is a latched message that came before: publishers repeat them for late joiners."""

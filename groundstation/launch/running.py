@@ -9,7 +9,7 @@ import json
 import os
 import stat
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from groundstation.declarations.errors import GroundStationError, UsageError
@@ -27,12 +27,16 @@ class RunningRig:
         rig: The rig's name.
         endpoint: Of the hub.
         vehicles: Names of its vehicles.
+        recording: First file that its recorder was asked for; empty for none.
+        recorder_stop: Why no recorder runs at present; empty where one does, and no part of which run it is.
     """
 
     pid: int
     rig: str
     endpoint: str
     vehicles: tuple[str, ...]
+    recording: str = ""
+    recorder_stop: str = field(default="", compare=False)
 
     @property
     def is_paused(self) -> bool:
@@ -66,9 +70,14 @@ def find_running() -> list[RunningRig]:
         try:
             reported = json.loads(path.read_text())
             run = RunningRig(
-                reported["pid"], reported["rig"], reported["endpoint"], tuple(reported["vehicles"])
+                reported["pid"],
+                reported["rig"],
+                reported["endpoint"],
+                tuple(reported["vehicles"]),
+                str(reported.get("recording", "")),
+                str(reported.get("recorder_stop", "")),
             )
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue  # being removed just now, or not ours
         if _lives(run.pid):
             found.append(run)

@@ -8,8 +8,9 @@ from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.record_stream import Recorded
 from groundstation.declarations.lease import Lease
 from groundstation.declarations.message import Message
+from groundstation.declarations.names import RECORDER
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
-from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveStatus
 
@@ -17,7 +18,12 @@ OF_A_VEHICLE: tuple[type[Message], ...] = (
     Supervision, Faults, ValveStatus, VehicleState, FusionStatus, Latency,
 )  # fmt: skip
 OF_THE_RIG: tuple[type[Message], ...] = (Lease, RecorderStatus)
-KINDS = {kind.TOPIC.noun: kind for kind in (*OF_A_VEHICLE, *OF_THE_RIG)}
+OF_A_PROCESS: tuple[type[Message], ...] = (Diagnostics,)
+KINDS: dict[str, type[Message]] = {
+    kind.TOPIC.noun: kind for kind in (*OF_A_VEHICLE, *OF_THE_RIG, *OF_A_PROCESS)
+}
+ERROR = 2
+"""Level of diagnostics: what reports does not do what it is there for."""
 LIGHT_TO_VALVE = "bus"
 """Stage of the ledger where the light that came in leaves as a command."""
 
@@ -52,6 +58,7 @@ class Glance:
         """Whether there is something of everything."""
         wanted = [(kind.TOPIC.noun, name) for kind in OF_A_VEHICLE for name in self._vehicles]
         wanted += [(kind.TOPIC.noun, "") for kind in OF_THE_RIG]
+        wanted.append((Diagnostics.TOPIC.noun, RECORDER))
         return all(key in self._newest for key in wanted)
 
     def as_dict(self, now_ns: int) -> dict[str, Any]:
@@ -79,9 +86,12 @@ class Glance:
 
     def _recorder(self) -> dict[str, Any] | None:
         status: RecorderStatus | None = self._get(RecorderStatus)
+        health: Diagnostics | None = self._get(Diagnostics, RECORDER)
         if status is None:
             return None
         return {
+            "is_stopped": health is not None and health.level >= ERROR,
+            "trouble": health.summary if health is not None else "",
             "path": status.path,
             "written_bytes": status.written_bytes,
             "free_bytes": status.free_bytes,

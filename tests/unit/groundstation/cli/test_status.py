@@ -3,6 +3,7 @@
 import json
 import os
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -11,7 +12,7 @@ from groundstation.cli import status as command
 from groundstation.declarations.lease import Lease
 from groundstation.launch.running import RunningRig
 from groundstation.parts.fusion.messages import FusionStatus, VehicleState
-from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveStatus
 
@@ -53,6 +54,7 @@ def publishing(fake_run):
         rig = (made(Lease), made(RecorderStatus, path="r.mcap", written_bytes=3_000_000, free_bytes=10**11))
         while not done.wait(0.02):
             fake_run.publish(*everything("alpha"), *everything("beta"), *rig)
+            fake_run.publish(made(Diagnostics, node="recorder"), owner="recorder")
 
     thread = threading.Thread(target=publish)
     thread.start()
@@ -87,6 +89,43 @@ def test_a_rig_that_publishes_nothing_is_shown_as_that(fake_run, groundstation, 
     output = groundstation("status").output
     assert "alpha: no ruling was published" in output
     assert "recorder  none" in output
+
+
+def test_a_recorder_that_was_asked_for_and_stopped_is_not_called_none(fake_run, groundstation, monkeypatch):
+    monkeypatch.setattr(command, "LOOKS_S", 0.1)
+    monkeypatch.setenv("COLUMNS", "80")
+    run = replace(fake_run.run, recording="/somewhere/x.mcap")
+    run.announce()
+    lines = groundstation("status").output
+    assert "recorder  STOPPED: /somewhere/x.mcap" in lines
+    assert "nothing has come from it within 0.1 s" in lines
+    why = "ended with code 2 (/somewhere/x.mcap.part cannot be written: Permission denied)"
+    replace(run, recorder_stop=why).announce()
+    lines = groundstation("status").output.splitlines()
+    assert why in " ".join(" ".join(lines).split())
+    assert max(map(len, lines)) <= 80
+    (rig,) = json.loads(groundstation("status", "--json").output)
+    assert (rig["recorder"]["is_stopped"], rig["recorder"]["trouble"]) == (True, why)
+
+
+def test_a_recorder_that_lives_and_writes_nothing_says_why(fake_run, groundstation, monkeypatch):
+    monkeypatch.setattr(command, "LOOKS_S", 0.5)
+    done = threading.Event()
+
+    def publish():
+        while not done.wait(0.02):
+            fake_run.publish(made(RecorderStatus, path="r.mcap"))
+            fake_run.publish(
+                made(Diagnostics, node="recorder", level=2, summary="r.mcap was deleted"), owner="recorder"
+            )
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    output = groundstation("status").output
+    done.set()
+    thread.join()
+    assert "recorder  STOPPED: r.mcap" in output
+    assert "r.mcap was deleted" in output
 
 
 def test_no_rig_is_no_error(tmp_path, monkeypatch, groundstation):

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from groundstation.declarations.lease import Lease
-from groundstation.parts.operation.messages import Latency, RecorderStatus
+from groundstation.parts.operation.messages import Diagnostics, Latency, RecorderStatus
 from groundstation.parts.supervision.messages import Faults, Supervision
 from groundstation.parts.valves.messages import ValveStatus
 from groundstation.watch.glance import OF_A_VEHICLE, OF_THE_RIG, Glance
@@ -55,6 +55,19 @@ def test_what_is_not_finite_is_none(glance, look):
     json.dumps(seen, allow_nan=False)
 
 
+def test_a_recorder_that_writes_nothing_is_stopped_and_says_why(glance, look, recorded, delivered, message):
+    look(RecorderStatus, "", path="r.mcap")
+    assert (glance.as_dict(0)["recorder"]["is_stopped"], glance.as_dict(0)["recorder"]["trouble"]) == (
+        False,
+        "",
+    )
+    for level, is_stopped in ((1, False), (2, True)):
+        health = message(Diagnostics, "", node="recorder", level=level, summary="r.mcap was deleted")
+        glance.take(recorded(delivered(health))._replace(owner="recorder"))
+        found = glance.as_dict(0)["recorder"]
+        assert (found["is_stopped"], found["trouble"]) == (is_stopped, "r.mcap was deleted")
+
+
 def test_faults_have_their_age_and_what_is_done(glance, look):
     look(
         Faults, ids=("dead_sky",), whats=("No fix.",), details=("7 s",), since_ns=(2.0 * S,),
@@ -70,12 +83,17 @@ def test_a_lease_that_has_expired_is_nobodys(glance, look):
     assert glance.as_dict(10 * S)["control"] == {"holder": "", "expires_s": None}
 
 
-def test_it_is_complete_once_there_is_something_of_everything(glance, look):
+def test_it_is_complete_once_there_is_something_of_everything(glance, look, recorded, delivered, message):
     kinds = [(kind, name) for kind in OF_A_VEHICLE for name in ("alpha", "beta")]
     kinds += [(kind, "") for kind in OF_THE_RIG]
     for kind, name in kinds:
         assert not glance.is_complete
         look(kind, name)
+    assert not glance.is_complete
+    health = recorded(delivered(message(Diagnostics, "", node="recorder")))
+    glance.take(health._replace(owner="outside"))
+    assert not glance.is_complete
+    glance.take(health._replace(owner="recorder"))
     assert glance.is_complete
 
 
