@@ -164,7 +164,7 @@ class LiveRun:
             return 0.0
         self.monitor.note(
             f"the run stood still for {still_s:.1f} s, paused or kept from the processor: "
-            "its processes heard nothing of each other"
+            "its processes received nothing from each other"
         )
         return still_s
 

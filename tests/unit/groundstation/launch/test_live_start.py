@@ -44,7 +44,7 @@ def clock(monkeypatch):
 @pytest.fixture
 def alone(live):
     """A run whose launcher has nothing to look after."""
-    live.launcher = SimpleNamespace(supervise=lambda: None, bus=None)
+    live.launcher = SimpleNamespace(supervise=lambda: None, bus=None, recorder=live.launcher.recorder)
     return live
 
 
