@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from calibration.guided_steps import GuidedSteps
 from calibration.imu.carried_check import GAP_S, Carried, Received, carried, held, held_before, warmed
@@ -12,8 +12,9 @@ from calibration.live_curve import LiveCurve
 from calibration.manoeuvres import Pose, push, turn
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
+from calibration.stepped_guide import SteppedGuide
 from groundstation.declarations.fix import PoseFix
-from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step, Wish
+from groundstation.declarations.guide import Curve, Drawing, Goal, Mark, Step
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.fusion import error_state as es
@@ -85,7 +86,7 @@ def check(number: int, home: Pose) -> Pose:
 MANOEUVRES = {"turn": turn, "push": push, CHECK: check}
 
 
-class GuidedImu:
+class GuidedImu(SteppedGuide):
     """One guided calibration: a filter of its own, and what the vehicle has done so far.
 
     Args:
@@ -94,6 +95,7 @@ class GuidedImu:
     """
 
     def __init__(self, rig: Rig, vehicle: str) -> None:
+        super().__init__(GuidedSteps(vehicle, rig.table.keep_in(), STEPS, MANOEUVRES))
         self._rig, self._vehicle = rig, vehicle
         sources = rig.tables.fix_sources
         fixes: list[type[Message]] = [sources[name].payload for name in fused_sources(rig, vehicle)]
@@ -101,7 +103,6 @@ class GuidedImu:
         self.kinds: tuple[type[Message], ...] = (*self._fed, *GuidedSteps.kinds)
         self._smoother = OfflineSmoother(widened(rig_noise(rig, vehicle)))
         self._node = fusion_node(rig, vehicle, self._smoother)
-        self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, MANOEUVRES)
         self._set_aside: list[Received] = []
         self._checked_s = 0.0
         self._first_c = self._check_c = math.nan
@@ -109,22 +110,17 @@ class GuidedImu:
         self._force = [LiveCurve(f"force {axis}, 100 mm/s²", "line", 0.1) for axis in "xy"]
         self._off = [LiveCurve(f"{axis}, {unit}") for axis, _, unit in AXES]
 
-    @property
-    def outcomes(self) -> dict[str, str]:
-        """How each step ended."""
-        return self._steps.outcomes
-
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle; those of the last step are kept apart."""
         if getattr(message, "vehicle", self._vehicle) != self._vehicle:
             return
-        self._steps.take(message)
+        self.steps.take(message)
         if isinstance(message, Imu):
             self._look(message)
-        if self._steps.name == CHECK:
+        if self.steps.name == CHECK:
             if not isinstance(message, PoseFix) or isinstance(message, self._fed):
                 self._set_aside.append((message, now_ns))
-            if isinstance(message, Imu) and self._steps.floats:
+            if isinstance(message, Imu) and self.steps.floats:
                 self._checked_s += message.window_s
             return
         if isinstance(message, PoseFix) and not isinstance(message, self._fed):
@@ -134,32 +130,12 @@ class GuidedImu:
                 for curve, off, (_, factor, _) in zip(self._off, answer.innovation, AXES, strict=True):
                     curve.add(answer.stamp_ns * 1e-9, factor * off)
 
-    def advice(self, now_s: float) -> Advice:
-        """Return what to do now."""
-        return self._steps.advice(now_s, self._known())
-
     def pictures(self) -> Sequence[Drawing]:
         """Return the readings, and how far each fix is off what the IMU predicts."""
         return (
             Drawing("What the IMU reads", "time, s", "", [c.curve() for c in (self._rate, *self._force)]),
             Drawing("Fix less what the IMU predicts", "time, s", "mm, deg", [c.curve() for c in self._off]),
         )
-
-    def hindrance(self) -> str:
-        """Return why the calibration cannot begin yet; empty if it can."""
-        return self._steps.hindrance()
-
-    def trouble(self) -> str:
-        """Return why the calibration ends early: somebody else has taken the vehicle; empty if nobody has."""
-        return self._steps.trouble()
-
-    def answer(self, action: str, reason: str) -> None:
-        """Note what became of a request; a refusal, with its reason, ends the step."""
-        self._steps.answer(action, reason)
-
-    def requests(self, now_s: float) -> Iterator[Wish]:
-        """Yield what the step of the last advice wants the vehicle to do, now and then."""
-        return self._steps.requests(now_s)
 
     def outcome(self) -> Outcome:
         """Return every constant with its sigma, tried on the flight that was kept apart.
@@ -211,14 +187,14 @@ class GuidedImu:
         """Keep some readings for the picture, and at which temperatures fit and check begin."""
         if math.isnan(self._first_c):
             self._first_c = imu.temperature_c
-        if math.isnan(self._check_c) and self._steps.name == CHECK:
+        if math.isnan(self._check_c) and self.steps.name == CHECK:
             self._check_c = imu.temperature_c
         t_s = imu.stamp_ns * 1e-9
         self._rate.add(t_s, math.degrees(imu.rate_body_rad_s))
         for curve, force in zip(self._force, imu.force_body_m_s2, strict=True):
             curve.add(t_s, 10.0 * force)
 
-    def _known(self) -> dict[str, float]:
+    def known(self) -> dict[str, float]:
         """Return the quantities of the goals."""
         known = {"checked_s": self._checked_s}
         if self._smoother.state() is None:

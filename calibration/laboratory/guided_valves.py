@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from calibration.live_curve import LiveCurve
 from calibration.manoeuvres import tour
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
-from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step, Wish
+from calibration.stepped_guide import SteppedGuide
+from groundstation.declarations.guide import Advice, Curve, Drawing, Goal, Mark, Step
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.parts.imu.messages import Imu
@@ -66,7 +67,7 @@ AXES = (
 )
 
 
-class GuidedValves:
+class GuidedValves(SteppedGuide):
     """One identification: a learner of its own, and a flight set aside.
 
     Args:
@@ -75,13 +76,13 @@ class GuidedValves:
     """
 
     def __init__(self, rig: Rig, vehicle: str) -> None:
+        manoeuvres = {"fly": tour, CHECK: tour}
+        super().__init__(GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S))
         self._rig, self._vehicle = rig, vehicle
         self._learner = valve_learner(rig, vehicle)
         self.kinds: tuple[type[Message], ...] = tuple(
             dict.fromkeys((*self._learner.inputs, *GuidedSteps.kinds))
         )
-        manoeuvres = {"fly": tour, CHECK: tour}
-        self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S)
         type_ = rig.type_of(vehicle)
         self._thrust_n = type_.valves.thrust_n
         self._config = identification_config(rig, vehicle)
@@ -90,23 +91,18 @@ class GuidedValves:
         self._flown_s = 0.0
         self._force = [LiveCurve(f"force {axis}, mm/s²", "line", 0.05) for axis in "xy"]
 
-    @property
-    def outcomes(self) -> dict[str, str]:
-        """How each step ended."""
-        return self._steps.outcomes
-
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle; those of the last step are not learned from."""
         if message.vehicle != self._vehicle:
             return
-        self._steps.take(message)
+        self.steps.take(message)
         if isinstance(message, Imu):
             for curve, force in zip(self._force, message.force_body_m_s2, strict=True):
                 curve.add(message.stamp_ns * 1e-9, 1e3 * force)
-        if self._steps.name == CHECK:
+        if self.steps.name == CHECK:
             self._check.take(message)
         elif isinstance(message, self._learner.inputs):
-            if isinstance(message, Imu) and self._steps.floats:
+            if isinstance(message, Imu) and self.steps.floats:
                 self._flown_s += message.window_s
             list(self._learner.receive(message, now_ns))
 
@@ -115,7 +111,7 @@ class GuidedValves:
         for learned in self._learner.tick(round(now_s * 1e9)):
             if isinstance(learned, ValvesLearned):
                 self._learned = learned
-        return self._steps.advice(now_s, self._known())
+        return super().advice(now_s)
 
     def pictures(self) -> Sequence[Drawing]:
         """Return each valve as it is known by now, and what the accelerometers read."""
@@ -136,22 +132,6 @@ class GuidedValves:
             Drawing("Each valve over the rig's", "valve", "%", curves),
             Drawing("What the accelerometers read", "time, s", "mm/s²", [c.curve() for c in self._force]),
         )
-
-    def hindrance(self) -> str:
-        """Return why it cannot begin yet; empty if it can."""
-        return self._steps.hindrance()
-
-    def trouble(self) -> str:
-        """Return why it ends early; empty while it goes on."""
-        return self._steps.trouble()
-
-    def answer(self, action: str, reason: str) -> None:
-        """Note what became of a request."""
-        self._steps.answer(action, reason)
-
-    def requests(self, now_s: float) -> Iterator[Wish]:
-        """Yield what the step wants the vehicle to do."""
-        return self._steps.requests(now_s)
 
     def outcome(self) -> Outcome:
         """Return thrust, torque and dead time of each valve, tried on the flight set aside.
@@ -217,7 +197,8 @@ class GuidedValves:
         )
         return numbers, complaint, tuple(_drawing(k, before, after) for k in range(3))
 
-    def _known(self) -> dict[str, float]:
+    def known(self) -> dict[str, float]:
+        """Return the quantities of the goals."""
         learned = self._learned
         known = {"checked_s": self._check.length_s}
         if learned is None:

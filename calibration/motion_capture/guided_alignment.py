@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from calibration.motion_capture.rigs_alignment import (
 from calibration.motion_capture.seen_by_both import SeenByBoth, pairs_of
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity, quantity_lines
+from calibration.stepped_guide import SteppedGuide
 from groundstation.declarations.fix import PoseFix
-from groundstation.declarations.guide import Advice, Drawing, Goal, Step, Wish
+from groundstation.declarations.guide import Advice, Drawing, Goal, Step
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.parts.fusion.messages import VehicleState
@@ -76,7 +77,7 @@ SOURCES: Mapping[str, type[Message]] = {
 """What the system can be laid beside, the best first."""
 
 
-class GuidedAlignment:
+class GuidedAlignment(SteppedGuide):
     """One alignment.
 
     Args:
@@ -86,14 +87,14 @@ class GuidedAlignment:
     """
 
     def __init__(self, rig: Rig, vehicle: str, source: str) -> None:
+        manoeuvres = {"move": tour, CHECK: tour}
+        super().__init__(GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S))
         self._vehicle, self._source = vehicle, source
         self._rigs = RigsAlignment.of(rig, vehicle)
         self._system = self._rigs.system
         self._body_name = self._rigs.body.body or vehicle
         self._flat = CaptureFrame(self._system.up, (0.0, 0.0, 0.0), 0.0)
         self.kinds: tuple[type[Message], ...] = (CapturedPose, SOURCES[source], *GuidedSteps.kinds)
-        manoeuvres = {"move": tour, CHECK: tour}
-        self._steps = GuidedSteps(vehicle, rig.table.keep_in(), STEPS, manoeuvres, EVERY_S)
         self._both = SeenByBoth((self._system.sigma_xy_m, self._system.sigma_heading_rad))
         self._fitted: list[Array] = []
         self._checked: list[Array] = []
@@ -106,13 +107,8 @@ class GuidedAlignment:
         self._off = [LiveCurve(f"{axis}, {unit}") for axis, _, unit in AXES]
 
     @property
-    def outcomes(self) -> dict[str, str]:
-        """How each step ended."""
-        return self._steps.outcomes
-
-    @property
     def _is_aside(self) -> bool:
-        return self._steps.name == CHECK
+        return self.steps.name == CHECK
 
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message of the vehicle or of the system."""
@@ -132,17 +128,17 @@ class GuidedAlignment:
                 sigma = (math.sqrt(xy_m2), math.sqrt(message.covariance[8]))
                 self._both.add_pose(message.stamp_ns, pose, sigma, self._is_aside)
         if message.vehicle == self._vehicle:
-            self._steps.take(message)
+            self.steps.take(message)
         for stamp_ns, row, is_aside in self._both.matched():
             (self._checked if is_aside else self._fitted).append(row)
             self._draw(row, stamp_ns)
 
     def advice(self, now_s: float) -> Advice:
         """Return what to do now."""
-        if now_s - self._judged_s >= JUDGED_EVERY_S and self._steps.name != CHECK:
+        if now_s - self._judged_s >= JUDGED_EVERY_S and self.steps.name != CHECK:
             self._judged_s = now_s
             self._judge()
-        return self._steps.advice(now_s, self._known())
+        return super().advice(now_s)
 
     def pictures(self) -> Sequence[Drawing]:
         """Return where both see it, and how far they are apart with the best alignment by now."""
@@ -158,7 +154,7 @@ class GuidedAlignment:
 
     def hindrance(self) -> str:
         """Return why it cannot begin yet; empty if it can."""
-        unknown = self._steps.hindrance()
+        unknown = super().hindrance()
         if unknown:
             return unknown
         if not self._both.is_seen:
@@ -166,18 +162,6 @@ class GuidedAlignment:
         if not self._both.has_poses:
             return f"no pose of {self._vehicle} is received from the other source ({self._source})."
         return ""
-
-    def trouble(self) -> str:
-        """Return why it ends early; empty while it goes on."""
-        return self._steps.trouble()
-
-    def answer(self, action: str, reason: str) -> None:
-        """Note what became of a request."""
-        self._steps.answer(action, reason)
-
-    def requests(self, now_s: float) -> Iterator[Wish]:
-        """Yield what the step wants the vehicle to do."""
-        return self._steps.requests(now_s)
 
     def outcome(self) -> Outcome:
         """Return the rig's keys of the system and of the rigid body, tried on what was set aside.
@@ -237,7 +221,8 @@ class GuidedAlignment:
         except CalibrationRefusedError:
             self._now = None
 
-    def _known(self) -> dict[str, float]:
+    def known(self) -> dict[str, float]:
+        """Return the quantities of the goals."""
         known = {"pairs": float(len(self._fitted)), "checked": float(len(self._checked))}
         if self._now is None:
             return known

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from calibration.guided_steps import GuidedSteps, Manoeuvre
 from calibration.live_curve import LiveCurve
 from calibration.manoeuvres import Pose
-from groundstation.declarations.guide import Advice, Curve, Drawing, Step, Wish
+from calibration.stepped_guide import SteppedGuide
+from groundstation.declarations.guide import Curve, Drawing, Step
 from groundstation.declarations.message import Message
 from groundstation.declarations.rig import Rig
 from groundstation.frames import wrap_angle
@@ -76,7 +77,7 @@ class Judged:
         return float(np.sqrt(self.poses[:, :2].var(axis=0).mean())) if len(self.poses) else math.nan
 
 
-class GuidedPictures:
+class GuidedPictures(SteppedGuide):
     """Collects the spots of pictures that show something new.
 
     Args:
@@ -88,18 +89,12 @@ class GuidedPictures:
     kinds: tuple[type[Message], ...] = (StarSpots, StarFix, *GuidedSteps.kinds)
 
     def __init__(self, rig: Rig, vehicle: str, plan: Plan) -> None:
+        super().__init__(GuidedSteps(vehicle, rig.table.keep_in(), plan.steps, plan.manoeuvres, plan.every_s))
         self.vehicle = vehicle
         section = camera_section(rig, vehicle)
         assert section is not None
         self.camera = section.camera.value(CameraCalibration.parse)
         self.catalogue = section.ceiling.value(StarCatalogue.parse)
-        self.steps = GuidedSteps(
-            vehicle,
-            rig.table.keep_in(),
-            plan.steps,
-            plan.manoeuvres,
-            plan.every_s,
-        )
         self.fitted: list[Spots] = []
         self.checked: list[Spots] = []
         self._newest: StarSpots | None = None
@@ -123,10 +118,6 @@ class GuidedPictures:
                 self._keep(self._newest, pose, message.stamp_ns)
                 self._newest = None
 
-    def advice(self, now_s: float) -> Advice:
-        """Return what to do now."""
-        return self.steps.advice(now_s, self.known())
-
     def known(self) -> dict[str, float]:
         """The quantities of the goals."""
         return {
@@ -149,22 +140,6 @@ class GuidedPictures:
             Drawing(title, "column, px", "row, px", (spots, newest), is_to_scale=True, is_downwards=True),
             Drawing("Where from", "x, m", "y, m", (self._places.curve(),), is_to_scale=True),
         )
-
-    def hindrance(self) -> str:
-        """Return why it cannot begin yet; empty if it can."""
-        return self.steps.hindrance()
-
-    def trouble(self) -> str:
-        """Return why it ends early; empty while it goes on."""
-        return self.steps.trouble()
-
-    def answer(self, action: str, reason: str) -> None:
-        """Note what became of a request."""
-        self.steps.answer(action, reason)
-
-    def requests(self, now_s: float) -> Iterator[Wish]:
-        """Yield what the step wants the vehicle to do."""
-        return self.steps.requests(now_s)
 
     def judged(self, camera: CameraCalibration, catalogue: StarCatalogue) -> Judged:
         """How the pictures set aside fit."""
