@@ -17,6 +17,7 @@ from calibration.imu import noise, procedures
 from calibration.imu import tilt as tilt_procedure
 from calibration.outcome import Outcome
 from calibration.result import provenance_of, provenance_of_several
+from groundstation.cli.number_options import LONGEST_S
 from groundstation.cli.plot_option import Plot
 from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
@@ -41,8 +42,8 @@ def zero_offset(source: Source, out: Out, plot: Plot = None, vehicle: Vehicle = 
 
 def zero_offset_fit(
     source: Source,
-    start_s: Annotated[float, typer.Option(help="Start of the stretch of flight.")],
-    end_s: Annotated[float, typer.Option(help="End of the stretch of flight.")],
+    start_s: Annotated[float, typer.Option(help="Start of the stretch of flight.", min=0.0, max=LONGEST_S)],
+    end_s: Annotated[float, typer.Option(help="End of the stretch of flight.", min=0.0, max=LONGEST_S)],
     out: Out,
     as_published: Annotated[
         bool,
@@ -104,10 +105,10 @@ def tilt(
         typer.Option(help="CSV along_x_deg,along_y_deg: each axis above the horizontal, a row per rest."),
     ] = None,
     tilt_sigma_deg: Annotated[
-        float, typer.Option(help="How sure those are (gauge blocks, their base).")
+        float, typer.Option(help="How sure those are (gauge blocks, their base).", min=1e-4, max=10.0)
     ] = 0.01,
     table_map: Annotated[Path | None, typer.Option(help="Map that says how the table pulls.")] = None,
-    least_s: Annotated[float, typer.Option(help="Shorter rests are left out.")] = 3.0,
+    least_s: Annotated[float, typer.Option(help="Shorter rests are left out.", min=1.0, max=3600.0)] = 3.0,
     plot: Plot = None,
     vehicle: Vehicle = None,
 ) -> None:
@@ -121,10 +122,6 @@ def tilt(
     Example: groundstation calibrate tilt level.mcap tilted.mcap --tilts tilts.csv --out tilt.toml
     """
     check_targets(out, plot, sources=inputs_of(*recordings, tilts, table_map))
-    if not least_s >= 1.0:
-        raise UsageError(f"--least-s must be 1 s or more, found {least_s:g}.")
-    if not tilt_sigma_deg > 0.0:
-        raise UsageError(f"--tilt-sigma-deg must be above zero, found {tilt_sigma_deg:g}.")
     known = None if table_map is None else TableMap.load(table_map)
     given = None if tilts is None else tilt_procedure.load_tilts(tilts)
     rests, notes = tilt_procedure.RestsFound(), []

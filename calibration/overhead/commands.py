@@ -23,12 +23,12 @@ def overhead(
     out: Annotated[Path, typer.Option(help="Result with provenance to write (TOML).")],
     camera_out: Annotated[Path | None, typer.Option(help="camera.json to write with the pose.")] = None,
     squares: Annotated[str, typer.Option(help="Squares of the ChArUco board, as 6x4.")] = "6x4",
-    square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1)] = 150.0,
-    marker_mm: Annotated[float, typer.Option(help="Edge of a marker.", min=0.1)] = 110.0,
-    thickness_mm: Annotated[float, typer.Option(help="Of the board.", min=0.0)] = 0.0,
+    square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1, max=1e4)] = 150.0,
+    marker_mm: Annotated[float, typer.Option(help="Edge of a marker.", min=0.1, max=1e4)] = 110.0,
+    thickness_mm: Annotated[float, typer.Option(help="Of the board.", min=0.0, max=1e3)] = 0.0,
     plot: Plot = None,
-    tape_mm: Annotated[float, typer.Option(help="How well places were measured.", min=0.01)] = 2.0,
-    tape_deg: Annotated[float, typer.Option(help="How well headings were.", min=1e-3)] = 0.2,
+    tape_mm: Annotated[float, typer.Option(help="How well places were measured.", min=0.01, max=1e3)] = 2.0,
+    tape_deg: Annotated[float, typer.Option(help="How well headings were.", min=1e-3, max=90.0)] = 0.2,
 ) -> None:
     """Find where the camera over the table hangs.
 

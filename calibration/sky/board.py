@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from calibration.outcome import CalibrationRefusedError
 
 MIN_PICTURES = 5
+MOST_SQUARES = 100
+LEAST_MARKER_M = 1e-4
 _CORNER_WINDOW = (7, 7)
 
 
@@ -32,8 +34,12 @@ class Board:
     def __post_init__(self) -> None:
         if self.columns < 4 or self.rows < 4:
             raise ValueError("a board needs at least 4 x 4 squares")
+        if self.columns > MOST_SQUARES or self.rows > MOST_SQUARES:
+            raise ValueError(f"a board has at most {MOST_SQUARES} x {MOST_SQUARES} squares")
         if not 0.0 <= self.marker_m < self.square_m:
             raise ValueError("the markers must be smaller than the squares")
+        if 0.0 < self.marker_m < LEAST_MARKER_M:
+            raise ValueError(f"the markers must be at least {1e3 * LEAST_MARKER_M:g} mm, or 0 for none")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -38,7 +38,9 @@ def lens(
     plot: Plot = None,
     wobble_mm: Annotated[
         float | None,
-        typer.Option(help="The frames were made turning in place; the origin moved so far.", min=1e-3),
+        typer.Option(
+            help="The frames were made turning in place; the origin moved so far.", min=1e-3, max=1e3
+        ),
     ] = None,
 ) -> None:
     """Calibrate the lens from the star field itself.
@@ -60,9 +62,12 @@ def mount(
     out: Out,
     camera_out: CameraOut = None,
     plot: Plot = None,
-    wobble_mm: Annotated[float, typer.Option(help="How far the body origin moved.", min=1e-3)] = 1.0,
+    wobble_mm: Annotated[float, typer.Option(help="How far the body origin moved.", min=1e-3, max=1e3)] = 1.0,
     first_heading_deg: Annotated[
-        float | None, typer.Option(help="True heading of the first frame; it gives the mount's yaw.")
+        float | None,
+        typer.Option(
+            help="True heading of the first frame; it gives the mount's yaw.", min=-360.0, max=360.0
+        ),
     ] = None,
 ) -> None:
     """Calibrate offset, tilt and yaw of the camera.
@@ -90,8 +95,10 @@ def board(
     folder: Annotated[Path, typer.Argument(help="With frames/ of a chessboard or ChArUco board.")],
     out: Out,
     squares: Annotated[str, typer.Option(help="Squares of the board, as 9x6.")] = "9x6",
-    square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1)] = 30.0,
-    marker_mm: Annotated[float, typer.Option(help="Edge of a ChArUco marker; 0: plain.", min=0.0)] = 0.0,
+    square_mm: Annotated[float, typer.Option(help="Edge of a square.", min=0.1, max=1e4)] = 30.0,
+    marker_mm: Annotated[
+        float, typer.Option(help="Edge of a ChArUco marker; 0: plain.", min=0.0, max=1e4)
+    ] = 0.0,
     camera: Annotated[Path | None, typer.Option(help="camera.json whose other keys to keep.")] = None,
     camera_out: CameraOut = None,
     plot: Plot = None,
@@ -118,7 +125,8 @@ def delay(
     source: Annotated[Path, typer.Argument(help="Recording (.mcap), or folder with imu.csv and stars.csv.")],
     out: Out,
     guess_s: Annotated[
-        float | None, typer.Option(help="First guess of the delay; default: the rig's, or 0.05.")
+        float | None,
+        typer.Option(help="First guess of the delay; default: the rig's, or 0.05.", min=0.0, max=10.0),
     ] = None,
     vehicle: Annotated[str | None, typer.Option(help="Whose, if the recording holds several.")] = None,
     plot: Plot = None,
@@ -151,14 +159,15 @@ def survey(
     ],
     out: Annotated[Path, typer.Option(help="Catalogue to write (CSV); its provenance beside it (TOML).")],
     tape_sigma_mm: Annotated[
-        float, typer.Option("--tape-std-mm", help="How well the anchors were measured.", min=0.01)
+        float, typer.Option("--tape-std-mm", help="How well the anchors were measured.", min=0.01, max=1e3)
     ] = 3.0,
     camera_out: Annotated[
         Path | None, typer.Option(help="camera.json to write with the ceiling's height as found.")
     ] = None,
     plot: Plot = None,
     verify_every: Annotated[
-        int, typer.Option(help="First without every so many pictures, to verify; 0: never.", min=0)
+        int,
+        typer.Option(help="First without every so many pictures, to verify; 0: never.", min=0, max=10_000),
     ] = 6,
     lens: Annotated[
         bool, typer.Option("--lens", help="Calibrate the lens from the same sweep (write --camera-out).")
@@ -202,7 +211,7 @@ def amend(
     recording: Annotated[Path, typer.Argument(help="Recording (.mcap).")],
     out: Annotated[Path, typer.Option(help="Star list to write (CSV); its provenance beside it (TOML).")],
     min_sightings: Annotated[
-        int, typer.Option(help="Add lights that were seen so often at one place.", min=1)
+        int, typer.Option(help="Add lights that were seen so often at one place.", min=1, max=1_000_000)
     ] = 50,
 ) -> None:
     """Bring a star list up to date from a flight.

@@ -8,6 +8,7 @@ LEAST = 1e-12
 """Smaller amounts that are not zero are none that anybody has measured; their inverses overflow."""
 MOST: Mapping[str, float] = {
     "m": 100.0,
+    "mm": 1e5,
     "m_s": 100.0,
     "m_s2": 100.0,
     "s": 1e5,
@@ -46,6 +47,17 @@ def unit_of(name: str) -> str:
     return next((end for end in ends if end in MOST), "")
 
 
+def fault_of(name: str, number: float) -> str:
+    """What is wrong with a number that nobody can mean, by the unit that its name ends in; else empty."""
+    unit = unit_of(name)
+    most = MOST.get(unit, UNITLESS)
+    if not abs(number) <= most:
+        return f"is {_shown(number)}, expected at most {most:g} {unit}".rstrip()
+    if 0.0 < abs(number) < LEAST:
+        return f"is {number:g}, expected 0 or at least {LEAST:g} {unit}".rstrip()
+    return ""
+
+
 def check_amounts(values: Mapping[str, object]) -> None:
     """Refuse a number that nobody can mean; lists and tables are looked into.
 
@@ -60,12 +72,9 @@ def check_amounts(values: Mapping[str, object]) -> None:
             check_amounts(value)
             continue
         for number in _numbers(value):
-            unit = unit_of(name)
-            most = MOST.get(unit, UNITLESS)
-            if not abs(number) <= most:
-                raise ValueError(f"'{name}' is {_shown(number)}, expected at most {most:g} {unit}".rstrip())
-            if 0.0 < abs(number) < LEAST:
-                raise ValueError(f"'{name}' is {number:g}, expected 0 or at least {LEAST:g} {unit}".rstrip())
+            fault = fault_of(name, number)
+            if fault:
+                raise ValueError(f"'{name}' {fault}")
 
 
 def _numbers(value: object) -> Iterable[float]:

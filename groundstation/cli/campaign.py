@@ -13,6 +13,7 @@ from groundstation.campaign.errors import CampaignError
 from groundstation.campaign.plan import Plan, parse_sweep
 from groundstation.campaign.running import Means, paths_of, run_campaign
 from groundstation.campaign.statistics import passed_of, wilson
+from groundstation.cli.number_options import LAST_SEED
 from groundstation.cli.run_progress import RunProgress
 from groundstation.recording.disk_file import check_new_recording
 from groundstation.scenario.loading import load
@@ -26,14 +27,15 @@ def campaign(
     file: Annotated[Path, typer.Argument(help="Scenario file (TOML).")],
     runs: Annotated[int, typer.Option(help="How many; of a sweep, for each value.", min=1, max=1_000_000)],
     out: Annotated[Path, typer.Option(help="Folder for runs.csv and report.html.")],
-    seed: Annotated[int, typer.Option(help="All runs follow from it.", min=0)] = 1,
+    seed: Annotated[int, typer.Option(help="All runs follow from it.", min=0, max=LAST_SEED)] = 1,
     workers: Annotated[
         int | None, typer.Option(help="Processes; as many as there are cores by default.", min=1, max=1024)
     ] = None,
     scheduler: Annotated[str, typer.Option(help="Of a dask.distributed cluster, tcp://host:port.")] = "",
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in --out.")] = False,
     only: Annotated[
-        int | None, typer.Option(help="Fly this run alone, record it, and report on it.", min=0)
+        int | None,
+        typer.Option(help="Fly this run alone, record it, and report on it.", min=0, max=1_000_000),
     ] = None,
     sweep: Annotated[str, typer.Option(help="key=first:last:number: values instead of chance.")] = "",
 ) -> None:

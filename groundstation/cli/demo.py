@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from drivers.laboratory.demo_data import demo_kinds
+from groundstation.cli.number_options import LAST_SEED
 from groundstation.cli.progress import with_progress
 from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
@@ -24,7 +25,9 @@ def demo() -> None:
 def data(
     folder: Annotated[Path, typer.Argument(help="Where the folders go; made if it is not there.")],
     only: Annotated[list[str] | None, typer.Option(help="Of this kind; may be repeated.")] = None,
-    seed: Annotated[int, typer.Option(help="Decides places, noise and all the rest.", min=0)] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Decides places, noise and all the rest.", min=0, max=LAST_SEED)
+    ] = 1,
 ) -> None:
     """Make small folders of every kind that commands take, and print what can be tried on each.
 

@@ -18,6 +18,7 @@ from groundstation.cli import (
     recording_pictures,
     recording_plot,
 )
+from groundstation.cli.number_options import MOST_MESSAGES
 from groundstation.declarations.errors import UsageError
 from groundstation.recording.causes import CauseIndex
 from groundstation.recording.errors import RecordingError
@@ -86,7 +87,7 @@ def causes(
     file: Annotated[Path, typer.Argument(help="Recording (.mcap).")],
     vehicle: Annotated[str, typer.Argument(help="Vehicle, or process for topics that processes own.")],
     topic: Annotated[str, typer.Argument(help="Topic, e.g. valve_command.")],
-    sequence: Annotated[int, typer.Argument(help="Number of the message, from 1.")],
+    sequence: Annotated[int, typer.Argument(help="Number of the message.", min=1, max=MOST_MESSAGES)],
 ) -> None:
     """Name all that a message was made from, back to bytes and light, with its age.
 

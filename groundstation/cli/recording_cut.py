@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.number_options import FromS, ToS
 from groundstation.cli.run_progress import RunProgress
 from groundstation.declarations.errors import UsageError
 from groundstation.parts.table import installed_tables
@@ -15,8 +16,8 @@ from groundstation.recording.errors import RecordingError
 def cut(
     file: Annotated[Path, typer.Argument(help="Recording (.mcap), or the folder of a run.")],
     out: Annotated[Path, typer.Option(help="Recording to write (.mcap).")],
-    from_s: Annotated[float, typer.Option(help="From here, s since the recording began.", min=0.0)] = 0.0,
-    to_s: Annotated[float | None, typer.Option(help="To here; default: the end.", min=0.0)] = None,
+    from_s: FromS = 0.0,
+    to_s: ToS = None,
 ) -> None:
     """Write what was recorded between two moments into a recording of its own.
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.number_options import FromS, ToS
 from groundstation.cli.run_progress import RunProgress
 from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
@@ -16,8 +17,8 @@ from groundstation.watch.film import FilmPlan, write_film
 def film(
     file: Annotated[Path, typer.Argument(help="Recording (.mcap), or the folder of a run.")],
     out: Annotated[Path, typer.Option(help="Film to write (.mp4, .avi).")],
-    from_s: Annotated[float, typer.Option(help="From here, s since the recording began.", min=0.0)] = 0.0,
-    to_s: Annotated[float | None, typer.Option(help="To here; default: the end.", min=0.0)] = None,
+    from_s: FromS = 0.0,
+    to_s: ToS = None,
     speed: Annotated[
         float, typer.Option(help="Seconds of flight in a second of film.", min=0.01, max=1000.0)
     ] = 1.0,

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.cli.number_options import FromS, ToS
 from groundstation.data_sets.inputs import inputs_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.png import write_png
@@ -20,8 +21,8 @@ def plot(
         list[str], typer.Argument(help="Field, e.g. 'alpha/state.position_table_m[0]'; several.")
     ],
     out: Annotated[Path, typer.Option(help="PNG to write.")],
-    from_s: Annotated[float, typer.Option(help="From here, s since the recording began.", min=0.0)] = 0.0,
-    to_s: Annotated[float | None, typer.Option(help="To here.", min=0.0)] = None,
+    from_s: FromS = 0.0,
+    to_s: ToS = None,
 ) -> None:
     """Draw fields of a recording against time, those of one unit on one axis.
 

@@ -18,6 +18,7 @@ from groundstation.cli.console_option import (
     attendants,
 )
 from groundstation.cli.live_view import run_live
+from groundstation.cli.number_options import LAST_SEED
 from groundstation.cli.run_beside import beside_of, check_ports
 from groundstation.cli.run_files import check_recording, finish_folder, finished_files, kept_in
 from groundstation.cli.run_progress import RunProgress
@@ -58,7 +59,8 @@ def run(
         ),
     ] = False,
     seed: Annotated[
-        int | None, typer.Option(help="Of the emulated laboratory; of a rig, in lockstep.", min=0)
+        int | None,
+        typer.Option(help="Of the emulated laboratory; of a rig, in lockstep.", min=0, max=LAST_SEED),
     ] = None,
     hardware: Annotated[
         Path | None, typer.Option(help="Fly a scenario on this rig; its twin flies it first.")

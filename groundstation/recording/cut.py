@@ -51,14 +51,7 @@ def cut(
     """
     check_new_recording(target)
     with Recording(source) as recording:
-        low_ns = recording.start_ns + round(span_s[0] * 1e9)
-        high_ns = recording.stop_ns + 1 if span_s[1] is None else recording.start_ns + round(span_s[1] * 1e9)
-        duration_s = (recording.stop_ns - recording.start_ns) * 1e-9
-        if not recording.start_ns <= low_ns < min(high_ns, recording.stop_ns + 1):
-            end = "its end" if span_s[1] is None else f"{span_s[1]:g} s"
-            raise RecordingError(
-                f"{source} is {duration_s:.1f} s long: there is nothing from {span_s[0]:g} s to {end}"
-            )
+        low_ns, high_ns = _stretch(recording, *span_s)
         before = recording.newest(latched, low_ns - 1)
         channels = {(c.noun, c.owner): c for c in recording.known_channels()}
         stated = {METADATA_NAME: recording.info.to_metadata()}
@@ -85,6 +78,21 @@ def cut(
     finally:
         temporary.unlink(missing_ok=True)
     return cutting.count
+
+
+def _stretch(recording: Recording, from_s: float, to_s: float | None) -> tuple[int, int]:
+    """First log time of a stretch, and the one before which it ends; whatever numbers are given."""
+    start_ns, end_ns = recording.start_ns, recording.stop_ns + 1
+    duration_s = (recording.stop_ns - start_ns) * 1e-9
+    if 0.0 <= from_s <= duration_s and (to_s is None or from_s < to_s):
+        low_ns = start_ns + round(from_s * 1e9)
+        high_ns = end_ns if to_s is None or to_s > duration_s else start_ns + round(to_s * 1e9)
+        if low_ns < min(high_ns, end_ns):
+            return low_ns, high_ns
+    end = "its end" if to_s is None else f"{to_s:g} s"
+    raise RecordingError(
+        f"{recording.path} is {duration_s:.1f} s long: there is nothing from {from_s:g} s to {end}"
+    )
 
 
 class _Cut:

@@ -69,7 +69,8 @@ def write_film(recording: Path, target: Path, plan: FilmPlan, progress: Progress
     else:
         times_s, size, picture_at = _drawn(recording, plan)
     if not len(times_s):
-        raise UsageError(f"{recording}: nothing lies between {plan.from_s:g} s and {plan.to_s or 0.0:g} s")
+        end = "its end" if plan.to_s is None else f"{plan.to_s:g} s"
+        raise UsageError(f"{recording}: nothing lies between {plan.from_s:g} s and {end}")
     part = target.with_name(f".part.{target.name}")
     try:
         writer, codec = _opened(part, plan.frames_per_s, size)
