@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from groundstation.declarations.guide import Number
+from groundstation.files.reading import open_file
 from groundstation.files.toml_file import Value, toml_lines, toml_table
 
 
@@ -90,7 +91,7 @@ def provenance_of(
     digest = hashlib.sha256()
     for file in files:
         digest.update(os.fsencode(file.name))
-        with file.open("rb") as content:
+        with open_file(file) as content:
             while block := content.read(1 << 20):
                 digest.update(block)
     return Provenance(recording.resolve().name, digest.hexdigest(), now_utc or datetime.now(UTC))

@@ -1,8 +1,11 @@
 """Bytes and text of a file, refused in one sentence."""
 
 import codecs
+import errno
 import os
+import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from drivers.files.errors import FileError
 
@@ -17,6 +20,19 @@ _WORKBOOKS = {b"PK\x03\x04": "a workbook (.xlsx, .ods)", b"\xd0\xcf\x11\xe0": "a
 _LOOKED_AT = 4096  # of bytes, to tell UTF-16 without a mark
 
 
+def open_file(path: Path) -> BinaryIO:
+    """Open a file for reading; of a pipe or a device nobody knows when it ends, or whether it begins.
+
+    Raises:
+        OSError: It is missing, cannot be read, or is a pipe, a device or a socket.
+    """
+    mode = path.stat().st_mode  # before it is opened: a pipe would wait for its other end
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # of a folder the system has a sentence of its own
+        what = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}.get(stat.S_IFMT(mode), "a device")
+        raise OSError(errno.EINVAL, f"it is {what}, expected a file", str(path))
+    return path.open("rb")
+
+
 def read_bytes(path: Path) -> bytes:
     """Read a whole file.
 
@@ -24,7 +40,8 @@ def read_bytes(path: Path) -> bytes:
         FileError: It is missing or cannot be read.
     """
     try:
-        return path.read_bytes()
+        with open_file(path) as file:
+            return file.read()
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
     except ValueError as error:  # a NUL in the name

@@ -18,6 +18,7 @@ from typing import Self, TextIO
 from groundstation.campaign.errors import CampaignError
 from groundstation.campaign.flying import Row
 from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
 from groundstation.files.writing import write_file
 
 CSV, WAITING, STATED = "runs.csv", "unordered.jsonl", "campaign.json"
@@ -132,7 +133,7 @@ class Rows:
             return
         if not resume:
             raise CampaignError(f"{self._folder} holds a campaign: --resume goes on with it")
-        differ = _differences(path.read_text(encoding="utf-8", errors="replace"), json.loads(stated))
+        differ = _differences(_text(path), json.loads(stated))
         if differ:
             raise CampaignError(
                 f"{self._folder} holds another campaign, by {STATED} in it: not the same {', '.join(differ)}"
@@ -141,9 +142,7 @@ class Rows:
     def _known(self) -> dict[int, Row]:
         known = _rows_of(self._folder / CSV, self._columns)
         journal = self._folder / WAITING
-        for line in (
-            journal.read_text(encoding="utf-8", errors="replace").splitlines() if journal.exists() else ()
-        ):
+        for line in _text(journal).splitlines() if journal.exists() else ():
             try:
                 row = json.loads(line)
             except ValueError:
@@ -207,6 +206,10 @@ def _locked(folder: Path) -> int:
     return held
 
 
+def _text(path: Path) -> str:
+    return read_bytes(path).decode(errors="replace").replace("\r\n", "\n")
+
+
 def _differences(text: str, stated: Mapping[str, object]) -> list[str]:
     """What is not the same in two statements of what a campaign is of."""
     try:
@@ -222,7 +225,7 @@ def _rows_of(path: Path, columns: tuple[str, ...]) -> dict[int, Row]:
     """Whole rows of a file, up to the first that is torn."""
     if not path.exists():
         return {}
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = _text(path)
     whole = text[: text.rfind("\n") + 1]
     found: dict[int, Row] = {}
     for number, cells in enumerate(_cells(whole)):

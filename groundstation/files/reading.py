@@ -1,5 +1,5 @@
 """Bytes and text of a file, as ``drivers.files`` reads them for the emulator, too."""
 
-from drivers.files.reading import path_of, read_bytes, text_of, text_of_path
+from drivers.files.reading import open_file, path_of, read_bytes, text_of, text_of_path
 
-__all__ = ["path_of", "read_bytes", "text_of", "text_of_path"]
+__all__ = ["open_file", "path_of", "read_bytes", "text_of", "text_of_path"]

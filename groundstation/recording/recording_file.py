@@ -6,6 +6,7 @@ from collections.abc import Container
 from pathlib import Path
 from typing import NamedTuple
 
+from groundstation.files.reading import open_file
 from groundstation.recording import records
 from groundstation.recording.channel_names import parse_channel
 from groundstation.recording.errors import RecordingError
@@ -57,7 +58,7 @@ class RecordingFile:
         self.path = path
         try:
             self.size = path.stat().st_size
-            self._file = path.open("rb")
+            self._file = open_file(path)
         except OSError as error:
             raise RecordingError(f"{path} cannot be opened: {error.strerror}") from error
         try:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+from groundstation.files.reading import open_file
 from groundstation.recording import records
 from groundstation.recording.disk_file import check_new_recording
 from groundstation.recording.errors import RecordingError
@@ -64,7 +65,7 @@ def recover(source: Path, target: Path) -> Recovery:
     check_new_recording(target)
     temporary = target.with_name(f".{os.getpid()}.recovering")
     try:
-        with source.open("rb") as file:
+        with open_file(source) as file:
             data = _mapped(file, source)
             with data, temporary.open("wb") as out:
                 recovery = _Copy(data, out, source).run()

@@ -19,7 +19,7 @@ from groundstation.declarations.rig_file import RigFile
 from groundstation.declarations.tables import Tables
 from groundstation.declarations.validation import first_sentence
 from groundstation.files.errors import FileError
-from groundstation.files.reading import path_of, read_bytes, text_of
+from groundstation.files.reading import open_file, path_of, read_bytes, text_of
 from groundstation.files.toml_file import toml_of
 from groundstation.parts.table import installed_tables
 from groundstation.rig.compose import rig_model
@@ -53,7 +53,8 @@ def read_text(path: Path, what: str = "rig file") -> str:
         RigError: There is no such file, or it is no text.
     """
     try:
-        content = path.read_bytes()
+        with open_file(path) as file:
+            content = file.read()
     except FileNotFoundError as error:
         raise RigError(f"{path}: there is no such {what}") from error
     except OSError as error:

@@ -13,7 +13,6 @@ neither names is compared bit for bit, as texts, counts and stamps always are::
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +20,9 @@ from pathlib import Path
 from groundstation.bus.cdr import ros_fields
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.message import Message
+from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
+from groundstation.files.toml_file import parse_toml
 
 DEFAULT = "default"
 OTHER = "other"
@@ -61,9 +63,9 @@ def load_tolerances(path: Path, payloads: Mapping[str, type[Message]]) -> Tolera
         UsageError: The file cannot be read, or names a topic or field that does not exist.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{path}: cannot be read as tolerances ({error})") from error
+        tables = parse_toml(read_bytes(path), path)
+    except FileError as error:
+        raise UsageError(str(error)) from error
     for noun, table in tables.items():
         if noun != DEFAULT and noun not in payloads:
             raise UsageError(f"{path}: {noun!r} is no topic")

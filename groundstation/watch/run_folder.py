@@ -22,6 +22,7 @@ from typing import Any
 from groundstation.declarations.errors import UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.files.errors import FileError
+from groundstation.files.reading import read_bytes
 from groundstation.files.writing import check_folder, write_file
 from groundstation.recording.run_files import FIRST_NAME, run_of
 from groundstation.recording.software import software
@@ -179,8 +180,8 @@ def kept_words(path: Path) -> list[str]:
     count = len(list((path / FILES).iterdir())) if (path / FILES).is_dir() else 0
     lines.append(f"beside it: {', '.join(kept)}" + (f", {count} files of the rig" if count else ""))
     try:
-        notes = (path / NOTES).read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError):
+        notes = read_bytes(path / NOTES).decode().splitlines()
+    except ValueError:
         notes = []
     return lines + [
         f"note: {line.removeprefix('- ')}" for line in notes if line.strip() and not line.startswith("#")
@@ -189,7 +190,7 @@ def kept_words(path: Path) -> list[str]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(read_bytes(path))
+    except ValueError:
         return {}
     return found if isinstance(found, dict) else {}

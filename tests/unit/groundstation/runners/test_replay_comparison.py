@@ -77,7 +77,7 @@ def test_tolerances_are_read_from_toml(tmp_path):
         ("default = 1e-9\n", "expected a table"),
         ("[default]\nfurlong = 1e-9\n", "default.furlong is no field"),
         ("[wrench]\nforce_x_n = true\n", "from 0 up"),
-        ("[state\n", "cannot be read"),
+        ("[state\n", "is not valid TOML"),
     ],
 )
 def test_wrong_tolerances_are_refused_in_one_sentence(tmp_path, text, sentence):
