@@ -19,9 +19,9 @@ from groundstation.cli import (
     recording_plot,
 )
 from groundstation.cli.number_options import MOST_MESSAGES
-from groundstation.declarations.errors import UsageError
+from groundstation.declarations.errors import GroundStationError, UsageError
 from groundstation.recording.causes import CauseIndex
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NothingRecoveredError, RecordingError
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.recover import recover as recover_file
@@ -62,11 +62,15 @@ def recover(
 ) -> None:
     """Bring everything readable of a torn or damaged recording into a new one.
 
+    Exit code 1 where nothing can be read: then no file is written.
+
     Example: groundstation recording recover recordings/2026-03-01_14-05-00_two_mock_ups/recording.mcap.part
     """
     target = out or _recovered_name(file)
     try:
         found = recover_file(file, target)
+    except NothingRecoveredError as error:
+        raise GroundStationError(str(error)) from error
     except RecordingError as error:
         raise UsageError(str(error)) from error
     print(f"{target}: {found.messages} messages")

@@ -21,6 +21,10 @@ class UnreachableFileError(LostFileError):
     """A file lies on a disk that was unmounted, or over which another lies: what it holds is there."""
 
 
+class NothingRecoveredError(RecordingError):
+    """A damaged recording holds no message that can be read."""
+
+
 class UnknownTopicError(RecordingError, KeyError):
     """A recording has no topic of that name."""
 

@@ -35,8 +35,7 @@ class Gap(NamedTuple):
         what = "damaged chunk was" if self.chunks == 1 else "damaged chunks were"
         which = "it" if self.chunks == 1 else "them"
         after, before = (
-            None if ns is None else f"{(ns - start_ns) * 1e-9:.3g} s"
-            for ns in (self.after_ns, self.before_ns)
+            None if ns is None else _since(ns, start_ns) for ns in (self.after_ns, self.before_ns)
         )
         if after is None and before is None:
             where = "and nothing else was there"
@@ -47,6 +46,11 @@ class Gap(NamedTuple):
         else:
             where = f"between {after} and {before}"
         return f"{self.chunks} {what} left out {where}: what was in {which} is missing"
+
+
+def _since(ns: int, start_ns: int) -> str:
+    span_s = (ns - start_ns) * 1e-9
+    return f"{span_s:.3g} s" if span_s < 100.0 else f"{span_s:.1f} s"
 
 
 def to_metadata(gaps: Iterable[Gap]) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """One finished file of a recording: its index, its channels, its chunks one at a time."""
 
+import mmap
 import os
 import struct
 from collections.abc import Container
@@ -13,9 +14,12 @@ from groundstation.recording.errors import RecordingError
 from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata
 from groundstation.recording.info import FORMAT, METADATA_NAME, RecordingInfo
 from groundstation.recording.records import MAGIC, RECORD, DamagedChunkError
+from groundstation.recording.resync import holds_messages
 from groundstation.recording.summary import ListedChunk, UnfinishedError, read_summary
 
 _RECOVER = "try `groundstation recording recover`"
+_LOOKED_THROUGH = 1 << 26
+"""Bytes of a file that cannot be opened, for what a recovery would find."""
 _UNREADABLE = (struct.error, ValueError, OverflowError, OSError)
 
 
@@ -105,6 +109,8 @@ class RecordingFile:
     def _open(self) -> None:
         try:
             if os.pread(self._file.fileno(), len(MAGIC), 0) != MAGIC:
+                if self._may_be_recovered():
+                    raise RecordingError(f"{self.path} is damaged at its beginning: {_RECOVER}")
                 raise RecordingError(f"{self.path} is no MCAP file")
             self.summary = read_summary(self._file.fileno(), self.size)
             metadata = dict(self._metadata(*place) for place in self.summary.metadata_places)
@@ -112,9 +118,9 @@ class RecordingFile:
                 number: found.data.decode(errors="replace") for number, found in self.summary.schemas.items()
             }
         except UnfinishedError as error:
-            raise RecordingError(f"{self.path} {error}: {_RECOVER}") from error
+            raise RecordingError(f"{self.path} {error}: {self._way_out()}") from error
         except _UNREADABLE as error:
-            raise RecordingError(f"{self.path} was not finished or is damaged: {_RECOVER}") from error
+            raise RecordingError(f"{self.path} was not finished or is damaged: {self._way_out()}") from error
         try:
             self.info = RecordingInfo.from_metadata(metadata.get(METADATA_NAME, {"format": str(FORMAT)}))
             self.gaps: tuple[Gap, ...] = from_metadata(metadata.get(GAPS_NAME, {}))
@@ -131,6 +137,18 @@ class RecordingFile:
             for number, channel in self.summary.channels.items()
             if channel.schema in schemas and channel.encoding == "cdr"
         }
+
+    def _way_out(self) -> str:
+        return _RECOVER if self._may_be_recovered() else "nothing in it can be recovered"
+
+    def _may_be_recovered(self) -> bool:
+        """Whether a recovery would find something; of a very long file only the beginning is searched."""
+        try:
+            length = min(self.size, _LOOKED_THROUGH)
+            with mmap.mmap(self._file.fileno(), length, access=mmap.ACCESS_READ) as data:
+                return holds_messages(data) or (length < self.size and data[: len(MAGIC)] == MAGIC)
+        except (OSError, ValueError):  # an empty file
+            return False
 
     def _metadata(self, offset: int, length: int) -> tuple[str, dict[str, str]]:
         """A metadata record; where a hole has hit it, another copy of it may stand elsewhere."""

@@ -18,7 +18,7 @@ from typing import BinaryIO
 from groundstation.files.reading import open_file
 from groundstation.recording import records
 from groundstation.recording.disk_file import check_new_recording
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NothingRecoveredError, RecordingError
 from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata, to_metadata
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.records import DamagedChunkError, Opcode
@@ -39,7 +39,7 @@ class Recovery:
         orphans: Messages lost because the name of their channel stood in a damaged chunk.
         was_finished: The file had been finished properly.
         gaps: Where the damaged chunks stood; the new file states them, those of an earlier recovery included.
-        start_ns: First log time of the new file.
+        start_ns: Least log time of the new file.
     """
 
     messages: int = 0
@@ -60,18 +60,27 @@ def recover(source: Path, target: Path) -> Recovery:
         target: The new file; it appears only once it is complete.
 
     Raises:
-        RecordingError: The source cannot be read or is no MCAP file, or the target is already there.
+        NothingRecoveredError: It holds no message that can be read: no file is written.
+        RecordingError: The source cannot be read or is no MCAP file, or the target is already there or cannot
+            be written.
     """
     check_new_recording(target)
     temporary = target.with_name(f".{os.getpid()}.recovering")
     try:
-        with open_file(source) as file:
-            data = _mapped(file, source)
-            with data, temporary.open("wb") as out:
-                recovery = _Copy(data, out, source).run()
-            temporary.replace(target)
+        file = open_file(source)
     except OSError as error:
-        raise RecordingError(f"{error.filename or target}: {error.strerror}") from error
+        raise RecordingError(f"{source}: {error.strerror}") from error
+    try:
+        with file, _mapped(file, source) as data, temporary.open("wb") as out:
+            recovery = _Copy(data, out, source).run()
+        if not recovery.messages:
+            lost = f"; the channel of {recovery.orphans} messages is lost" if recovery.orphans else ""
+            raise NothingRecoveredError(
+                f"{source}: nothing could be recovered, it holds no message that can be read{lost}"
+            )
+        temporary.replace(target)
+    except OSError as error:
+        raise RecordingError(f"{target}: {error.strerror}") from error
     finally:
         temporary.unlink(missing_ok=True)
     return recovery
@@ -111,7 +120,8 @@ class _Copy:
         self._left_out = 0
         self._ahead: list[records.Record] | None = None  # chunks behind, not looked through for channels yet
         self._metadata: list[tuple[str, dict[str, str]]] = []
-        self._newest_ns: int | None = None
+        self._newest_ns: int | None = None  # of the chunk before: chunks may stand in any order
+        self._is_new_chunk = True
         self._schemas: dict[int, records.Schema] = {}
         self._channels: dict[int, records.Channel] = {}
         self._new_schemas: dict[int, int] = {}
@@ -187,10 +197,14 @@ class _Copy:
 
     def _close_gap(self, before_ns: int | None) -> None:
         if self._left_out:
-            self._found.gaps.append(Gap(self._left_out, self._newest_ns, before_ns))
+            after_ns = self._newest_ns
+            if after_ns is not None and before_ns is not None:
+                after_ns, before_ns = min(after_ns, before_ns), max(after_ns, before_ns)
+            self._found.gaps.append(Gap(self._left_out, after_ns, before_ns))
             self._left_out = 0
 
     def _inside(self, data: bytes) -> None:
+        self._is_new_chunk = True
         for opcode, start, stop in records.complete_records(data):
             if opcode == Opcode.MESSAGE:
                 self._message(data[start:stop])
@@ -216,9 +230,10 @@ class _Copy:
                 return
             channel = self._new_channels[number] = self._register(known)
         self._close_gap(log_ns)
-        if self._newest_ns is None:
-            self._found.start_ns = log_ns
-        self._newest_ns = max(log_ns, self._newest_ns or 0)
+        self._found.start_ns = min(log_ns, self._found.start_ns) if self._found.messages else log_ns
+        is_newest = self._is_new_chunk or self._newest_ns is None or log_ns > self._newest_ns
+        self._newest_ns = log_ns if is_newest else self._newest_ns
+        self._is_new_chunk = False
         self._writer.add_message(channel, log_ns, content[records.MESSAGE.size :], publish_ns, sequence)
         self._found.messages += 1
 

@@ -75,6 +75,17 @@ def walk(data: Data, position: int = 0, listed: Sequence[int] = ()) -> Iterator[
         yield Lost(start, position)
 
 
+def holds_messages(data: Data) -> bool:
+    """Whether chunks or messages begin anywhere: a recovery brings back those that are not damaged."""
+    for piece in walk(data, len(MAGIC) if data[: len(MAGIC)] == MAGIC else 0):
+        if isinstance(piece, Record):
+            if piece.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+                return True
+        elif piece.stop == len(data) and data[piece.start] == Opcode.CHUNK:
+            return True  # it was being written
+    return False
+
+
 def is_chunk_at(data: Data, start: int) -> bool:
     """Whether a whole chunk record begins there."""
     record = _record_at(data, start)

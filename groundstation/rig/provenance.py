@@ -62,9 +62,14 @@ def recorded_rig(recording: Recording) -> Rig:
     the files are those of the recording, else the first where they can be read.
 
     Raises:
-        RigError: The rig is wrong, or a file that it names is found in none of these folders.
+        RigError: There is none, it is wrong, or a file that it names is found in none of these folders.
     """
     info = recording.info
+    if not info.rig_toml:
+        raise RigError(
+            f"{recording.path} carries no rig: it was recorded without one, or a damage took the part of the "
+            "file that held it"
+        )
     usable: Rig | None = None
     refusal: RigError | None = None
     for path in _places(recording):

@@ -3,6 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
+from groundstation.cli.main import call as command_line
 from groundstation.cli.recording import app
 from groundstation.declarations.errors import UsageError
 from groundstation.parts.table import installed_tables
@@ -45,7 +46,7 @@ def test_info_of_a_live_recording_names_the_date(tmp_path, flight):
 
 def test_recover_takes_the_name_that_the_finished_file_would_have(tmp_path, path):
     torn = tmp_path / "torn.mcap.part"
-    torn.write_bytes(path.read_bytes()[:5000])
+    torn.write_bytes(path.read_bytes()[:-2000])
     reported = call("recover", torn)
     assert (tmp_path / "torn.mcap").exists()
     with Recording(tmp_path / "torn.mcap") as recording:
@@ -76,3 +77,10 @@ def test_a_discarded_recording_leaves_nothing(tmp_path, flight):
     recorder.discard()
     recorder.discard()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_console_of_a_recording_without_a_rig_says_so(tmp_path, flight, capsys):
+    with Recorder(tmp_path / "bare.mcap", RecordingInfo()) as recorder:
+        recorder.record(flight[0], flight[0].envelope.publish_ns)
+    assert command_line(["console", str(tmp_path / "bare.mcap")]) == 2
+    assert capsys.readouterr().err.startswith(f"groundstation: {tmp_path / 'bare.mcap'} carries no rig: ")

@@ -21,7 +21,7 @@ from groundstation.bus.ros_schema import ENCODING, schema_text
 from groundstation.cli.main import call
 from groundstation.parts.imu.messages import ImuBytes
 from groundstation.parts.table import installed_tables
-from groundstation.recording.errors import RecordingError
+from groundstation.recording.errors import NothingRecoveredError, RecordingError
 from groundstation.recording.gaps import GAPS_NAME, Gap, from_metadata
 from groundstation.recording.info import RecordingInfo
 from groundstation.recording.policy import ImagePolicy
@@ -84,7 +84,11 @@ def test_every_cut_gives_back_a_prefix_with_no_readable_message_lost(tmp_path, w
     @settings(max_examples=60, deadline=None, derandomize=True)
     @given(st.integers(first, len(whole)) | st.sampled_from([e + d for e in ends for d in (-1, 0, 1)]))
     def check(cut):
-        report, target = recovered(tmp_path, whole[:cut])
+        try:
+            report, target = recovered(tmp_path, whole[:cut])
+        except NothingRecoveredError:
+            assert readable(whole[:cut]) == 0
+            return
         found = messages(target)
         assert found == everything[: len(found)]
         assert len(found) >= readable(whole[:cut])
@@ -94,18 +98,72 @@ def test_every_cut_gives_back_a_prefix_with_no_readable_message_lost(tmp_path, w
     check()
 
 
-def test_a_cut_in_the_head_is_refused_or_gives_an_empty_recording(tmp_path, whole):
+def test_a_cut_in_the_head_leaves_nothing_to_recover(tmp_path, whole):
     for cut in range(0, 600, 7):
         (tmp_path / "x.part").write_bytes(whole[:cut])
-        target = tmp_path / f"{cut}.mcap"
-        if cut < 8:
-            with pytest.raises(RecordingError, match="no MCAP"):
-                recover(tmp_path / "x.part", target)
-            assert not target.exists()
-        else:
-            assert recover(tmp_path / "x.part", target).messages == 0
-            with Recording(target) as recording:
-                assert list(recording.messages(EVERYTHING)) == []
+        with pytest.raises(RecordingError, match="no MCAP" if cut < 8 else "nothing could be recovered"):
+            recover(tmp_path / "x.part", tmp_path / "x.mcap")
+        assert [path.name for path in tmp_path.iterdir()] == ["x.part"]
+
+
+def spoilt(whole, how):
+    return {
+        "a lost beginning": bytes(200) + whole[200:],
+        "a lost magic": bytes(8) + whole[8:],
+        "a torn file without its beginning": bytes(200) + whole[200 : chunk_ends(whole)[1]],
+        "a torn file": whole[: chunk_ends(whole)[1]],
+        "a head alone": whole[:60],
+        "zeros": whole[:8] + bytes(5000) + whole[-8:],
+        "text": b"no recording" * 400,
+        "nothing": b"",
+    }[how]
+
+
+@pytest.mark.parametrize(
+    ("how", "sentence"),
+    [
+        ("a lost beginning", "is damaged at its beginning: try `groundstation recording recover`"),
+        ("a lost magic", "is damaged at its beginning: try `groundstation recording recover`"),
+        (
+            "a torn file without its beginning",
+            "is damaged at its beginning: try `groundstation recording recover`",
+        ),
+        ("a torn file", "was not finished or is damaged: try `groundstation recording recover`"),
+        ("a head alone", "was not finished or is damaged: nothing in it can be recovered"),
+        ("zeros", "was not finished or is damaged: nothing in it can be recovered"),
+        ("text", "is no MCAP file"),
+        ("nothing", "is no MCAP file"),
+    ],
+)
+def test_what_a_reader_advises_is_what_a_recovery_can_do(how, sentence, tmp_path, whole, capsys):
+    source, target = tmp_path / "spoilt.mcap", tmp_path / "new.mcap"
+    source.write_bytes(spoilt(whole, how))
+    assert call(["recording", "info", str(source)]) == 2
+    assert capsys.readouterr().err.rstrip().endswith(sentence)
+    code = call(["recording", "recover", str(source), "--out", str(target)])
+    assert target.exists() == ("try" in sentence) == (code == 0)
+    assert code == {"try `": 0, "nothi": 1}.get(sentence.partition(": ")[2][:5], 2)
+
+
+def shuffled(whole):
+    """Chunks of a recording in the order last, second, first, without an index; the second is damaged."""
+    ends = chunk_ends(whole)
+    summary = make_reader(io.BytesIO(whole)).get_summary()
+    places = [(index.chunk_start_offset, end) for index, end in zip(summary.chunk_indexes, ends, strict=True)]
+    first, second, *_, last = (bytearray(whole[start:end]) for start, end in places)
+    second[-40] ^= 0x10
+    return whole[: places[0][0]] + bytes(last + second + first)
+
+
+def test_gaps_of_chunks_in_any_order_lie_within_the_recording_and_run_forward(tmp_path, whole, capsys):
+    report, target = recovered(tmp_path, shuffled(whole))
+    (gap,) = report.gaps
+    assert gap.after_ns <= gap.before_ns
+    with Recording(target) as recording:
+        assert report.start_ns == recording.start_ns <= gap.after_ns
+        assert gap.before_ns <= recording.stop_ns
+        (sentence,) = recording.missing()
+    assert "-" not in sentence
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
@@ -201,8 +259,8 @@ def test_channels_that_no_other_chunk_names_are_counted(tmp_path):
     writer.flush()
     broken = bytearray(file.getvalue())
     broken[end - 150] ^= 0x10
-    report, _ = recovered(tmp_path, bytes(broken))
-    assert (report.damaged_chunks, report.orphans, report.messages) == (1, 3, 0)
+    with pytest.raises(NothingRecoveredError, match="the channel of 3 messages is lost"):
+        recovered(tmp_path, bytes(broken))
 
 
 def test_zeros_that_a_power_cut_left_are_no_records(tmp_path, whole):
