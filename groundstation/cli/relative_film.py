@@ -19,6 +19,7 @@ from groundstation.cli.relative_review import Review
 from groundstation.data_sets.relative_film import Film, Shot
 from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
+from groundstation.files.film import check_film
 from groundstation.relative_navigation.answers import Track
 from groundstation.relative_navigation.motion_models import Tracker
 from groundstation.relative_navigation.overlay import draw_track
@@ -104,10 +105,12 @@ class _Write:
 
     def __init__(self, writer: cv2.VideoWriter | None) -> None:
         self._writer = writer
+        self.count = 0
 
     def __call__(self, drawn: Picture) -> None:
         if self._writer is not None:
             self._writer.write(drawn)
+            self.count += 1
 
 
 @contextmanager
@@ -123,6 +126,8 @@ def _writer(path: Path | None, film: Film, settings: TrackerSettings) -> Iterato
         writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()]), rate, size)
         if not writer.isOpened():
             raise FileError(f"{path}: this installation of OpenCV cannot write such a film.")
-        yield _Write(writer)
+        write = _Write(writer)
+        yield write
         writer.release()
+        check_film(part, path, write.count)
         part.replace(path)

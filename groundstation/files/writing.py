@@ -138,7 +138,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     Files that are there already stay, unless they have the name of a new one.
 
     Raises:
-        FileError: The folder cannot be made, or a file is in its place.
+        FileError: The folder cannot be made, a file is in its place, or the disk takes no more.
     """
     try:
         if path.exists() and not path.is_dir():
@@ -148,7 +148,16 @@ def whole_folder(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise FileError(f"{path}: no such folder can be made ({error.strerror or error}).") from error
     with made as unfinished:
-        yield Path(unfinished)
-        path.mkdir(exist_ok=True)
-        for file in sorted(Path(unfinished).iterdir()):
-            file.replace(path / file.name)
+        try:
+            yield Path(unfinished)
+            path.mkdir(exist_ok=True)
+            for file in sorted(Path(unfinished).iterdir()):
+                file.replace(path / file.name)
+        except FileError as error:  # it names the folder that was asked for
+            if unfinished not in str(error):
+                raise
+            raise FileError(str(error).replace(unfinished, str(path))) from error
+        except OSError as error:
+            if error.filename is not None and not str(error.filename).startswith(unfinished):
+                raise  # of a file that was read
+            raise FileError(f"{path}: cannot be written ({error.strerror or error}).") from error

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
+from groundstation.files.film import check_film
 from groundstation.parts.overhead.messages import OverheadImage
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
@@ -78,8 +79,7 @@ def write_film(recording: Path, target: Path, plan: FilmPlan, progress: Progress
             writer.write(picture_at(t_s))
             progress("filming", done / len(times_s))
         writer.release()
-        if not part.exists() or not part.stat().st_size:
-            raise FileError(f"{target}: cannot be written.")
+        check_film(part, target, len(times_s))
         part.replace(target)
     except OSError as error:
         raise FileError(f"{target}: cannot be written ({error.strerror or error}).") from error

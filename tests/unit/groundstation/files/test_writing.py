@@ -92,7 +92,7 @@ def test_a_name_as_long_as_the_disk_takes_is_written_and_one_that_no_locale_coul
 
 
 def test_a_folder_comes_whole_or_not_at_all(tmp_path):
-    with pytest.raises(FileNotFoundError), whole_folder(tmp_path / "out") as folder:
+    with pytest.raises(FileError), whole_folder(tmp_path / "out") as folder:
         (folder / "one" / "two").write_text("1")
     assert not list(tmp_path.iterdir())
     with whole_folder(tmp_path / "out") as folder:
@@ -106,3 +106,29 @@ def test_pictures_and_figures_become_png(tmp_path, what):
     data = (tmp_path / "a.png").read_bytes()
     assert data == png_of(what)
     assert data.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("is_ours", [True, False])
+def test_a_full_disk_is_told_by_the_folder_that_was_asked_for(is_ours, tmp_path):
+    there = tmp_path / "there"
+    there.mkdir()
+    (there / "a").write_text("before")
+
+    def write(folder):
+        (folder / "a").write_text("after")
+        (folder / "b").symlink_to("/dev/full")
+        if is_ours:
+            raise FileError(f"{folder / 'b'}: cannot be written (No space left on device).")
+        with (folder / "b").open("w") as file:
+            file.write("text")
+
+    said = f"^{there}.*: cannot be written .No space left on device"
+    with pytest.raises(FileError, match=said), whole_folder(there) as folder:
+        write(folder)
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    assert (there / "a").read_text() == "before"
+
+
+def test_a_file_that_is_read_keeps_its_name_in_what_is_said(tmp_path):
+    with pytest.raises(FileNotFoundError, match="nowhere"), whole_folder(tmp_path / "new"):
+        (tmp_path / "nowhere").read_text()

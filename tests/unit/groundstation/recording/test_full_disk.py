@@ -49,3 +49,36 @@ def test_a_full_disk_is_one_sentence(command, limit, flight, tmp_path):
     assert not out.exists()
     left = [path.name for path in tmp_path.iterdir()]
     assert left == (["out.mcap.part"] if is_begun else [])
+
+
+@pytest.mark.parametrize(
+    ("words", "out"),
+    [
+        (["recording", "film", "{}", "--speed", "5", "--out"], "out.avi"),
+        (["recording", "export", "{}", "--csv"], "tables"),
+        (["report", "{}", "--out"], "report"),
+        (["recording", "cut", "{}", "--out"], "out.mcap"),
+    ],
+    ids=lambda given: " ".join(given[:2]) if isinstance(given, list) else given,
+)
+def test_what_a_full_disk_does_not_take_leaves_nothing_and_names_what_was_asked_for(
+    words, out, flight, tmp_path
+):
+    target = tmp_path / out
+    if target.suffix == ".avi":
+        target.write_text("before")
+    done = subprocess.run(
+        [sys.executable, "-c", WITH_A_LIMIT.format(20_000), *(word.format(flight) for word in words), target],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 2
+    line = done.stderr.splitlines()[-1]
+    assert line.startswith(f"groundstation: {target}")
+    assert "Traceback" not in done.stderr
+    assert ".part" not in line
+    assert [path.name for path in tmp_path.iterdir()] == ([out] if target.suffix == ".avi" else [])
+    assert target.suffix != ".avi" or target.read_text() == "before"
