@@ -24,16 +24,15 @@ KEY = "mock_ups.standard.star_camera.camera"
 def reads(monkeypatch):
     """Paths of all files that are read, in order."""
     found = []
-    real = Path.read_bytes
+    real = Path.open
 
-    def read_bytes(self):
-        if not self.resolve().is_relative_to(
-            ROOT / "groundstation"
-        ):  # the compiled core looks at its sources
+    def opened(self, mode="r", *more, **options):
+        is_core = self.resolve().is_relative_to(ROOT / "groundstation")  # looks at its sources
+        if "b" in mode and not is_core:
             found.append(self.resolve())
-        return real(self)
+        return real(self, mode, *more, **options)
 
-    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    monkeypatch.setattr(Path, "open", opened)
     return found
 
 
