@@ -21,10 +21,16 @@ def test_standard_types_are_worded_as_ros_words_them(cls, store):
     assert schema_text(cls) == expected
 
 
-@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
-def test_generated_text_is_what_rosbags_makes_of_the_registered_type(cls):
+@pytest.fixture(scope="module")
+def store():
+    """A store of rosbags in which every class of ours is registered."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     register(store, CLASSES)
+    return store
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_generated_text_is_what_rosbags_makes_of_the_registered_type(store, cls):
     expected, _ = store.generate_msgdef(cls.ROS_TYPE, ros_version=2)
     assert schema_text(cls) == expected
 
