@@ -1,6 +1,7 @@
 """A follower that knows its leader by its side camera: accuracy, the switch, a leader that is hidden."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from groundstation.parts.relative_navigation.messages import LeaderState, Relati
 START_S = 8.0
 """By then both fly and stand at 1.5 m."""
 SWITCHED = [('leader_by = "side_camera"', 'leader_by = "star_fixes"')]
+EMULATED = Path(__file__).parents[2] / "calibration" / "rigs" / "emulated"
 HIDING = ("covered_side_camera", "dark_side_view", "frozen_side_camera", "silent_side_camera")
 
 
@@ -130,3 +132,65 @@ def test_by_star_fixes_a_covered_camera_changes_nothing(fly):
     assert flight.modes("beta")[-1] == "flying"
     assert "leader_old" not in flight.faults("beta", START_S)
     assert rms(distance_errors(flight, START_S)) < 0.006
+
+
+THIRD = """
+[vehicles.gamma]
+mock_up = "standard"
+bus_index = 2
+imu = "laboratory:gamma/imu"
+imu_serial_number = 3
+fixes = "laboratory:gamma/fixes"
+reference = "laboratory:gamma/reference"
+hold = {{ x_m = {x_m}, y_m = {y_m}, heading_deg = 0.0 }}
+
+[[laboratory.vehicles]]
+name = "gamma"
+start_m = [{x_m}, {y_m}]
+start_heading_deg = 0.0
+imu = {{ model = "published", averaging = 10, ftdi_latency_ms = 1 }}
+camera = {{ source = "fixes", rate_hz = 15.0, delay_s = 0.015 }}
+"""
+
+
+def three_alike(fly, tmp_path, by, leader_y_m, third_m):
+    """The leader, its follower and a third one that looks exactly like the leader."""
+    kind = "side_bodies.toml" if by == "markers" else "side_bodies_plain.toml"
+    text = (EMULATED / kind).read_text()
+    alpha = text[text.index("[alpha]") : text.index("[beta]")]
+    gamma = alpha.replace("[alpha]", "[gamma]")
+    bodies = tmp_path / "bodies.toml"
+    bodies.write_text(text.split("[gamma]")[0] + gamma)
+    files = 'bodies = "../../calibration/rigs/emulated/side_bodies.toml"'
+    changes = [
+        ('by = "markers"', f'by = "{by}"'),
+        (f"{files}\ndelay_s", f'bodies = "{bodies.as_posix()}"\ndelay_s'),
+        (f"{files} }}", f'bodies = "{bodies.as_posix()}" }}'),
+        ("hold = { x_m = -0.8, y_m = 0.0", f"hold = {{ x_m = -0.8, y_m = {leader_y_m}"),
+        ("start_m = [-0.8, 0.0]", f"start_m = [-0.8, {leader_y_m}]"),
+    ]
+    third = THIRD.format(x_m=third_m[0], y_m=third_m[1])
+    return fly(third, rig="side_camera", seed=3, changes=changes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("by", ["markers", "lit_part"])
+def test_a_third_mock_up_that_looks_like_the_leader_is_not_followed(fly, tmp_path, by):
+    """The camera sees gamma alone; the leader is beside its field of view."""
+    flight = three_alike(fly, tmp_path, by, 1.2, (-0.7, 0.0)).run(START_S + 3.0)
+    seen = flight.of(RelativePose, "beta", 5.0)
+    assert len(seen) > 50
+    assert {pose.status for pose in seen} == {"ambiguous"}
+    assert all("is where gamma is" in pose.reason for pose in seen)
+    assert not flight.of(LeaderState, "beta")
+    assert "leader_old" in flight.faults("beta")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("by", ["markers", "lit_part"])
+def test_a_leader_is_followed_where_another_like_it_is_elsewhere(fly, tmp_path, by):
+    flight = three_alike(fly, tmp_path, by, 0.0, (-0.8, 1.2)).run(START_S + 4.0)
+    seen = flight.of(RelativePose, "beta", START_S)
+    assert {pose.status for pose in seen} == {"solved"}
+    assert rms(distance_errors(flight, START_S)) < 0.006
+    assert "leader_old" not in flight.faults("beta")

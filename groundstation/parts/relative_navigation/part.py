@@ -15,6 +15,7 @@ from groundstation.parts.relative_navigation.sections import (
     SideCameraOfVehicleSection,
     SideCameraSection,
 )
+from groundstation.relative_navigation.rivals import rivals_of
 from groundstation.relative_navigation.side_bodies import SideBody, parse_side_bodies
 from groundstation.relative_navigation.side_camera import SideCamera
 
@@ -51,6 +52,15 @@ def _body(rig: Rig, vehicle: str) -> SideBody:
     raise ValueError(f"{path} has no table [{own.looks_for}] for the vehicle of that name")
 
 
+def _rivals(rig: Rig, vehicle: str) -> dict[str, float]:
+    """Other vehicles that may be taken for whom a vehicle's camera looks for; how near they come (m)."""
+    own, body = _own(rig, vehicle), _body(rig, vehicle)
+    assert own is not None
+    known = {other.vehicle: other for other in _camera(rig, vehicle).bodies.value(parse_side_bodies)}
+    others = {name: known.get(name) for name in rig.vehicles if name not in (vehicle, own.looks_for)}
+    return rivals_of(body, others, own.by)
+
+
 def _finder(rig: Rig, vehicle: str) -> Node:
     from groundstation.parts.relative_navigation.side_finder import SideFinder  # OpenCV loads only here
 
@@ -64,6 +74,7 @@ def _finder(rig: Rig, vehicle: str) -> Node:
         (section.camera, section.bodies),
         ExposureDelay(section.delay_s, section.delay_sigma_s),
         (section.sigma_xy_m, section.sigma_heading_rad),
+        _rivals(rig, vehicle),
     )
 
 

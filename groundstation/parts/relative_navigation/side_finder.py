@@ -1,7 +1,7 @@
 """Side finder: pictures of the camera on the hull in, place and turn of another mock-up or a refusal out."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import cv2
 import numpy as np
@@ -10,8 +10,10 @@ from drivers.star_camera.exposure import ExposureDelay
 from groundstation.declarations.message import Message
 from groundstation.declarations.node import Node
 from groundstation.declarations.rig_file import RigFile
+from groundstation.parts.fusion.messages import VehicleState
 from groundstation.parts.operation.messages import CalibrationInUse
 from groundstation.parts.relative_navigation.messages import RelativePose, SideImage
+from groundstation.parts.relative_navigation.who_is_where import WhoIsWhere
 from groundstation.relative_navigation.side_bodies import SideBody
 from groundstation.relative_navigation.side_camera import SideCamera
 from groundstation.relative_navigation.side_looks import LOOKS
@@ -30,9 +32,11 @@ class SideFinder(Node):
         files: Calibration files of both, for the record.
         delay: From the middle of the exposure to a picture's stamp.
         floor_sigma: What calibration leaves in every sighting: x, y (m), heading (rad).
+        rivals: Other vehicles that may be taken for the one that is looked for, and how near the two bodies
+            can come (m): a sighting that one of them explains as well is ambiguous.
     """
 
-    inputs = (SideImage,)
+    inputs: tuple[type[Message], ...] = (SideImage,)
     outputs = (RelativePose, CalibrationInUse)
 
     def __init__(
@@ -44,8 +48,12 @@ class SideFinder(Node):
         files: tuple[RigFile, ...],
         delay: ExposureDelay,
         floor_sigma: tuple[float, float],
+        rivals: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(vehicle)
+        self._who = WhoIsWhere(vehicle, body, rivals or {})
+        if rivals:
+            self.inputs = (SideImage, VehicleState)
         cv2.setNumThreads(1)  # results must not depend on the number of cores
         self._camera, self._body, self._files, self._delay = camera, body, files, delay
         self._look = LOOKS[by](camera, body)
@@ -56,21 +64,37 @@ class SideFinder(Node):
     def start(self, now_ns: int) -> Iterator[Message]:
         yield CalibrationInUse.of(now_ns, self.vehicle, self._files)
 
+    def sources(self, payload: type[Message]) -> tuple[str, ...]:
+        return self._who.vehicles if payload is VehicleState else (self.vehicle,)
+
+    def takes_paced(self, payload: type[Message], source: str) -> bool:
+        del source
+        return payload is VehicleState
+
     def receive(self, message: Message, now_ns: int) -> Iterator[Message]:
         del now_ns
-        assert isinstance(message, SideImage)
+        match message:
+            case VehicleState():
+                self._who.remember(message)
+            case SideImage():
+                yield self._looked(message)
+
+    def _looked(self, message: SideImage) -> RelativePose:
         stamp_ns = self._delay.middle_ns(message.device_stamp_ns or message.stamp_ns)
         reason = self._mismatch(message)
         if reason:
-            yield self._unseen(stamp_ns, Unseen(reason))
-            return
+            return self._unseen(stamp_ns, Unseen(reason))
         picture = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
         reason = self._repeats.complaint_about(picture, message.stamp_ns)
         if reason:
-            yield self._unseen(stamp_ns, Unseen(reason))
-            return
+            return self._unseen(stamp_ns, Unseen(reason))
         answer = self._look(picture)
-        yield self._unseen(stamp_ns, answer) if isinstance(answer, Unseen) else self._seen(stamp_ns, answer)
+        if isinstance(answer, Unseen):
+            return self._unseen(stamp_ns, answer)
+        reason = self._who.objection(answer, stamp_ns)
+        if reason:
+            return self._unseen(stamp_ns, Unseen(reason, is_ambiguous=True))
+        return self._seen(stamp_ns, answer)
 
     def _mismatch(self, image: SideImage) -> str:
         """Why a picture is not what the camera's file speaks of; empty if it is."""
