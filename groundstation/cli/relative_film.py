@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.cli.annotated_film import annotated_film
 from groundstation.cli.progress import progress_line
 from groundstation.cli.relative_review import Review
 from groundstation.data_sets.relative_film import Film, Shot
-from groundstation.declarations.errors import UsageError
-from groundstation.files.errors import FileError
-from groundstation.files.film import check_film
 from groundstation.relative_navigation.answers import Track
 from groundstation.relative_navigation.motion_models import Tracker
 from groundstation.relative_navigation.overlay import draw_track
@@ -28,9 +23,8 @@ from groundstation.relative_navigation.tracker_settings import Frame, TrackerSet
 
 Picture = NDArray[np.uint8]
 
-CODECS = {".avi": "MJPG", ".mp4": "mp4v"}
-"""Ending to codec of an annotated film."""
 _PREVIEW_HZ = 30.0
+"""Of the annotated film, where the frames come more slowly than a film can be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,9 +52,11 @@ def track_film(
     cv2.setNumThreads(1)
     finder = SpotFinder(looks)
     finder.look(np.zeros((settings.camera.height_px, settings.camera.width_px), np.uint8))
+    size = (settings.camera.width_px, settings.camera.height_px)
+    rate_hz = film.rate_hz if film.rate_hz > 0.5 else _PREVIEW_HZ
     answers: list[tuple[Track, float]] = []
     troubles: Counter[Trouble] = Counter()
-    with progress_line() as progress, _writer(annotated, film, settings) as write:
+    with progress_line() as progress, annotated_film(annotated, rate_hz, size) as write:
         for shot in film.shots():
             begin = time.process_time()
             seen = _seen(shot, finder)
@@ -78,7 +74,12 @@ def track_film(
         f"{trouble.value}: {troubles[trouble]}" for trouble in Trouble if trouble.value and troubles[trouble]
     ]
     if film.broken_from is not None:
-        notes.append(f"the film is broken from frame {film.broken_from} of {film.count} on")
+        notes.append(
+            f"the film is broken from frame {film.broken_from} on: {film.unreadable} of {film.count} frames "
+            "cannot be read"
+        )
+    if film.complaints:
+        notes.append(f"the decoder of the film complained at {film.complaints} frames: they may be damaged")
     return FilmAnswers(answers, notes)
 
 
@@ -88,46 +89,3 @@ def _seen(shot: Shot, finder: SpotFinder) -> SpotsSeen:
 
 def _black(settings: TrackerSettings) -> Picture:
     return np.zeros((settings.camera.height_px, settings.camera.width_px), np.uint8)
-
-
-def check_annotated(path: Path | None) -> None:
-    """Refuse a name that no film of ours has.
-
-    Raises:
-        UsageError: The ending is none of `CODECS`.
-    """
-    if path is not None and path.suffix.lower() not in CODECS:
-        raise UsageError(f"--annotated must end in {' or '.join(CODECS)}, found {path.name!r}.")
-
-
-class _Write:
-    """Writes frames into a film, or nowhere."""
-
-    def __init__(self, writer: cv2.VideoWriter | None) -> None:
-        self._writer = writer
-        self.count = 0
-
-    def __call__(self, drawn: Picture) -> None:
-        if self._writer is not None:
-            self._writer.write(drawn)
-            self.count += 1
-
-
-@contextmanager
-def _writer(path: Path | None, film: Film, settings: TrackerSettings) -> Iterator[_Write]:
-    """Give what writes the annotated film; it takes its place when all has gone well."""
-    if path is None:
-        yield _Write(None)
-        return
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part.") as folder:
-        part = Path(folder) / path.name
-        size = (settings.camera.width_px, settings.camera.height_px)
-        rate = film.rate_hz if film.rate_hz > 0.5 else _PREVIEW_HZ
-        writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()]), rate, size)
-        if not writer.isOpened():
-            raise FileError(f"{path}: this installation of OpenCV cannot write such a film.")
-        write = _Write(writer)
-        yield write
-        writer.release()
-        check_film(part, path, write.count)
-        part.replace(path)

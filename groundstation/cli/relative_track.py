@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 import typer
 
+from groundstation.cli.annotated_film import check_annotated
 from groundstation.cli.progress import with_progress
-from groundstation.cli.relative_film import check_annotated, track_film
+from groundstation.cli.relative_film import track_film
 from groundstation.cli.relative_review import Review
 from groundstation.data_sets.relative_case import RelativeCase, load_case
 from groundstation.data_sets.relative_film import Film
@@ -32,7 +33,8 @@ from groundstation.relative_navigation.tracker_settings import Frame
 
 HEADER = "frame,t,status,x,y,z,q0,q1,q2,q3,wx,wy,wz,std_pos_m,std_att_deg,ms\n"
 RATES_HEADER = "frame,t,vx_m_s,vy_m_s,vz_m_s,wx_rad_s,wy_rad_s,wz_rad_s\n"
-MOST_RATE_HZ = 10_000.0
+LEAST_RATE_HZ, MOST_RATE_HZ = 1e-3, 10_000.0
+"""Of a film: slower, and nothing of the motion between two frames is foretold."""
 Answer = tuple[Track, float]
 """A frame's answer, and the CPU time that it took, ms."""
 
@@ -89,8 +91,8 @@ def track(
         raise UsageError("give --out POSES.csv, the table to write.")
     if video is None and (annotated or review or rate_hz is not None):
         raise UsageError("--annotated, --review and --rate-hz go with --video.")
-    if rate_hz is not None and not 0.0 < rate_hz <= MOST_RATE_HZ:
-        raise UsageError(f"--rate-hz must be above 0 and at most {MOST_RATE_HZ:g}, found {rate_hz:g}.")
+    if rate_hz is not None and not LEAST_RATE_HZ <= rate_hz <= MOST_RATE_HZ:
+        raise UsageError(f"--rate-hz must be {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}, found {rate_hz:g}.")
     check_annotated(annotated)
     check_targets(out, annotated, review, rates, sources=[case, target, pixels, video])
     path = case if case is not None else target

@@ -1,7 +1,8 @@
 """Pictures of a target in order of time: a video file, FRAMES.npz, or a folder of pictures.
 
 A film that ends in a broken frame, or whose frames change size, is read to its end: what cannot be used is
-given as a trouble in the place of a picture.
+given as a trouble in the place of a picture. A picture that repeats the one before byte for byte was not
+taken at its time: noise never repeats.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from groundstation.data_sets.relative_frames import read_frames
 from groundstation.data_sets.star_folder import read_frame
 from groundstation.files.errors import FileError
+from groundstation.files.foreign_lines import ForeignLines
 from groundstation.relative_navigation.pinhole import PinholeCamera
 from groundstation.relative_navigation.spots import Trouble
 
@@ -26,6 +28,8 @@ Picture = NDArray[np.uint8]
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".tif", ".tiff"})
 DEFAULT_RATE_HZ = 30.0
 _MOST_RATE_HZ = 10_000.0
+_LIGHT_DN = 8
+"""Between darkest and brightest: pictures with less may be alike, there is nothing in them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +56,13 @@ class Film:
         path: Video file, ``.npz`` or folder.
         camera: Whose size frames must have.
         rate_hz: Frames a second; None: the file's own, else 30.
+
+    Attributes:
+        count: Frames that the file names; 0 where it does not tell.
+        rate_hz: Frames a second.
+        broken_from: The first frame that cannot be read, as far as `shots` has come.
+        unreadable: How many cannot.
+        complaints: At how many the decoder printed something: they may be damaged.
 
     Raises:
         FileError: There is no such film, it holds no frame, or its first frame has another size.
@@ -86,16 +97,22 @@ class Film:
             )
         self.rate_hz = own if rate_hz is None else rate_hz
         self.broken_from: int | None = None
+        self.unreadable = self.complaints = 0
 
     def shots(self) -> Iterator[Shot]:
         """Every frame, in order; once."""
         number = 0
+        before: Picture | None = None
         for picture in self._pictures():
             trouble = Trouble.NONE
             if picture is None:
                 trouble = Trouble.BROKEN
             elif picture.shape[:2] != (self._camera.height_px, self._camera.width_px):
                 picture, trouble = None, Trouble.WRONG_SIZE
+            elif before is not None and np.array_equal(picture, before) and int(np.ptp(picture)) > _LIGHT_DN:
+                picture, trouble = None, Trouble.FROZEN
+            else:
+                before = picture
             if trouble is Trouble.BROKEN and self.broken_from is None:
                 self.broken_from = number
             yield Shot(number, number / self.rate_hz, picture, trouble)
@@ -112,18 +129,24 @@ class Film:
                 try:
                     yield read_frame(file, None, is_colour=None)
                 except FileError:
+                    self.unreadable += 1
                     yield None
             return
         assert self._video is not None
         read = 0
-        while True:
-            there, picture = self._video.read()
-            if not there:
-                break
-            read += 1
-            yield np.asarray(picture, dtype=np.uint8)
-        self._video.release()
+        with ForeignLines() as lines:
+            while True:
+                with lines.held():
+                    there, picture = self._video.read()
+                self.complaints += lines.were_there()
+                if not there:
+                    break
+                read += 1
+                yield np.asarray(picture, dtype=np.uint8)
+            with lines.held():
+                self._video.release()
         if read < self.count:
+            self.unreadable = self.count - read
             yield None  # the container names frames that its decoder does not give
 
 
@@ -132,7 +155,8 @@ def _opened(path: Path) -> cv2.VideoCapture:
         raise FileError(f"{path}: no such file.")
     if not path.is_file() or path.stat().st_size == 0:
         raise FileError(f"{path}: is an empty file." if path.is_file() else f"{path}: is no file.")
-    video = cv2.VideoCapture(str(path))
+    with ForeignLines() as lines, lines.held():
+        video = cv2.VideoCapture(str(path))
     if not video.isOpened():
         raise FileError(f"{path}: is no video that can be decoded.")
     return video

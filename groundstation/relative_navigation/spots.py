@@ -52,6 +52,7 @@ class Trouble(StrEnum):
     TOO_MANY = "more light spots than any target has"
     WRONG_SIZE = "the frame has another size than the camera's"
     BROKEN = "the frame is broken"
+    FROZEN = "the frame repeats the one before byte for byte"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import resource
 import tomllib
 
 import cv2
@@ -137,6 +138,65 @@ def test_frames_of_other_sizes_and_without_a_target_are_propagated(call, film, t
         assert words in said.output
 
 
+def test_an_annotated_film_that_cannot_be_written_whole_leaves_the_one_that_was_there(call, film, tmp_path):
+    folder, _ = film
+    seen, out = tmp_path / "seen.avi", tmp_path / "p.csv"
+    seen.write_bytes(b"the film of yesterday")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, limits[1]))  # as a disk that is nearly full
+    try:
+        with pytest.raises(FileError, match=r"seen\.avi: cannot be written"):
+            call(
+                "track",
+                folder / "case.json",
+                "--video",
+                folder / "film.avi",
+                "--out",
+                out,
+                "--annotated",
+                seen,
+            )
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert seen.read_bytes() == b"the film of yesterday"
+    assert [path.name for path in tmp_path.iterdir()] == ["seen.avi"]
+
+
+def test_decoders_print_nothing_of_their_own_and_bad_frames_are_counted(call, film, tmp_path, capfd):
+    folder, _ = film
+    data, rng = bytearray((folder / "film.avi").read_bytes()), np.random.default_rng(3)
+    for place in rng.integers(6000, len(data) // 2, 200).tolist():
+        data[place] ^= 0x5A
+    (tmp_path / "bad.avi").write_bytes(data[: int(0.7 * len(data))])
+    said = call("track", folder / "case.json", "--video", tmp_path / "bad.avi", "--out", tmp_path / "p.csv")
+    assert capfd.readouterr().err == ""
+    assert f"of {FRAMES} frames cannot be read" in said.output
+    assert "the decoder of the film complained at" in said.output
+
+
+def test_a_picture_that_comes_twice_is_not_solved_twice(call, film, tmp_path):
+    folder, _ = film
+    frames = np.load(folder / "frames.npz")["frames"]
+    np.savez(tmp_path / "frozen.npz", frames=frames[[0, 1, 2, 2, 2, 5]])
+    said = call(
+        "track",
+        folder / "case.json",
+        "--video",
+        tmp_path / "frozen.npz",
+        "--out",
+        tmp_path / "p.csv",
+        "--rate-hz",
+        "2",
+    )
+    assert [row["status"] for row in read(tmp_path / "p.csv")] == [
+        *["solved"] * 3,
+        "propagated",
+        "propagated",
+        "solved",
+    ]
+    assert "repeats the one before byte for byte: 2" in said.output
+
+
 def test_a_film_without_any_target_gives_no_pose(call, film, tmp_path, rng):
     folder, _ = film
     frames = np.stack([pictures.paint(rng.uniform(50, 400, (9, 2)), np.full(9, 2.0), rng) for _ in range(3)])
@@ -174,6 +234,7 @@ def test_options_that_do_not_go_together_are_refused(call, film, tmp_path):
             "must end in",
         ),
         (("--video", folder / "film.avi", "--out", out), "one case"),
+        ((case, "--video", folder / "film.avi", "--out", out, "--rate-hz", "1e-300"), "0.001 to 10000"),
         ((case, "--video", folder / "film.avi"), "--out"),
     ):
         with pytest.raises(UsageError, match=sentence):
