@@ -25,10 +25,14 @@ def pose_bound(camera: PinholeCamera, points_body_m: Floats, pose: Pose, sigma_p
 
 
 def position_sigma_m(covariance: Floats) -> float:
-    """Return the root of the summed position variances of a pose covariance (6, 6)."""
-    return math.sqrt(float(np.trace(covariance[:3, :3])))
+    """Return the root of the summed position variances of a pose covariance (6, 6); NaN if it is none."""
+    return _root(float(np.trace(covariance[:3, :3])))
 
 
 def attitude_sigma_rad(covariance: Floats) -> float:
-    """Return the root of the summed turn variances of a pose covariance (6, 6)."""
-    return math.sqrt(float(np.trace(covariance[3:, 3:])))
+    """Return the root of the summed turn variances of a pose covariance (6, 6); NaN if it is none."""
+    return _root(float(np.trace(covariance[3:, 3:])))
+
+
+def _root(variance: float) -> float:
+    return math.sqrt(variance) if variance >= 0.0 else math.nan

@@ -52,7 +52,7 @@ def frame_information(
 
 def settle(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """Return what is still possible, likeliest first, with weights that sum to one."""
-    kept = [each for each in hypotheses if math.isfinite(each.weight) and each.motion.has_finite_state()]
+    kept = [each for each in hypotheses if math.isfinite(each.weight) and each.motion.is_sound()]
     kept.sort(key=lambda each: -each.weight)
     different: list[Hypothesis] = []
     for each in kept:

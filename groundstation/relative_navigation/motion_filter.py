@@ -42,6 +42,11 @@ TURN_FRAMES, ALONG_FRAMES, ACROSS_FRAMES = 12.0, 8.0, 2.0
 SURPRISE = 25.0
 """Squared miss of a prediction in sigmas, three numbers or fewer, at which that motion is believed less."""
 MOST_REOPENINGS = 12
+WIDEST_TURN_RAD, WIDEST_SHARE = 2.0 * math.pi, 10.0
+"""A prediction with such a sigma, of its turn or as a share of its distance, says nothing: to believe the
+motion still less would only cost the digits of what is known."""
+LEAST_SCALED = 1e-13
+"""Least eigenvalue of a pose covariance scaled to ones on its diagonal; below, rounding has eaten it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +125,14 @@ class MotionFilter:
                 _square(off[:3] @ axes[:, :1], axes[:, :1].T @ covariance[:3, :3] @ axes[:, :1]),
                 _square(off[:3] @ axes[:, 1:], axes[:, 1:].T @ covariance[:3, :3] @ axes[:, 1:]),
             )
-            worse = np.array([surprise > SURPRISE for surprise in surprises])
+            reach = WIDEST_SHARE * float(np.linalg.norm(mean.position_camera_m))
+            spread = np.diag(axes.T @ covariance[:3, :3] @ axes)
+            wide = (
+                float(np.trace(covariance[3:, 3:])) > WIDEST_TURN_RAD**2,
+                float(spread[0]) > reach**2,
+                float(spread[1:].sum()) > reach**2,
+            )
+            worse = np.array([s > SURPRISE and not w for s, w in zip(surprises, wide, strict=True)])
             if not worse.any():
                 return
             self._levels = self._levels + worse
@@ -198,11 +210,16 @@ class MotionFilter:
         turn, along, across = (np.power(STEP, self._levels) * self._unit[:, 0]).tolist()
         return turn, along, across
 
-    def has_finite_state(self) -> bool:
-        """Whether nothing has run away."""
-        return math.isfinite(float(self._bank.covariances.sum())) and math.isfinite(
-            float(self._bank.states.sum())
-        )
+    def is_sound(self) -> bool:
+        """Whether nothing has run away, and the covariance of the pose is one: symmetric and positive."""
+        if not math.isfinite(float(self._bank.covariances.sum()) + float(self._bank.states.sum())):
+            return False
+        pose = self._bank.covariances[0, :6, :6]
+        size = np.diag(pose)
+        if not float(size.min()) > 0.0:
+            return False
+        scaled = pose / np.sqrt(np.outer(size, size))
+        return float(np.linalg.eigvalsh(scaled)[0]) > LEAST_SCALED
 
 
 def _square(off: Floats, covariance: Floats) -> float:

@@ -4,13 +4,14 @@ Ivanov, Karpenko, Ovchinnikov 2012 (Chibis-M), section 2.2; Simakov, Ustyugov 20
 last frame is carried on to the next; in a neighbourhood of each predicted point the nearest centre is taken;
 the solver begins at the prediction, and its answer is the next state. A frame with fewer than four points
 that span space corrects nothing: the prediction is the answer and is carried on, errors and all. What the
-publication does not say: one centre serves one point only, and rates before the second frame are zero.
+publication does not say: one centre serves one point only, rates before the second frame are zero, and a pose
+that misses its centres by far more than their noise is none.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ from groundstation.relative_navigation.tracker_settings import Frame, TrackerSet
 
 Floats = NDArray[np.float64]
 
+MOST_COST = 16.0
+"""Sum of squares for each centre, in sigmas, beyond which strays were taken for points."""
 REACH_PX = 12.0
 """The published neighbourhood epsilon where the case gives none; no value is published: assumed."""
 
@@ -73,12 +76,15 @@ class PublishedFrames:
             points = self._settings.target.points_from_mass_m
             sight = sight_of(frame.centres, matches)
             fit = self._solver(self._settings.camera, points, sight, ahead.pose, None)
-        if fit is None or not fit.converged:
+        if fit is None or not fit.converged or fit.cost > MOST_COST * len(matches):
             self._state = ahead
             reason = Reason.TOO_FEW_POINTS if fit is None else Reason.NO_SOLUTION
+            if fit is not None and fit.converged:
+                reason = Reason.NO_AGREEMENT
             return self._track(
                 frame, ahead, Status.PROPAGATED, Reason.NO_POINTS if not len(frame.centres) else reason
             )
+        fit = _honest(fit, len(matches))
         self._state = self._corrected(frame.t_s, fit)
         self._solved = (frame.t_s, fit)
         return self._track(frame, self._state, Status.SOLVED, Reason.NONE, matches)
@@ -168,3 +174,9 @@ class PublishedFrames:
             residual,
             matched=pairs,
         )
+
+
+def _honest(fit: PoseFit, count: int) -> PoseFit:
+    """The pose with a covariance that holds a misfit beyond the noise of its centres, too."""
+    misfit = fit.cost / max(1, 2 * count - 6)
+    return fit if misfit <= 1.0 else replace(fit, covariance=misfit * fit.covariance)

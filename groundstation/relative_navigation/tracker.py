@@ -89,6 +89,8 @@ class MotionTracker:
         """Give a frame to one hypothesis: pose, pairs and log likelihood; None if it explains nothing."""
         motion = hypothesis.motion
         motion.predict(frame.t_s)
+        if not motion.is_sound():
+            return None
         pose, covariance = motion.prior
         found = self._solved(frame.centres, pose, covariance)
         if found is None:
@@ -238,6 +240,9 @@ class MotionTracker:
         return self._answer(frame, candidates[0].fit, candidates[0].matches)
 
     def _propagated(self, frame: Frame, reason: Reason) -> Track:
+        if not self._hypotheses[0].motion.is_sound():
+            self._hypotheses = []
+            return lost(frame.number, frame.t_s, reason)
         estimate = self._hypotheses[0].motion.estimate
         pose, covariance = self._origin(estimate.pose, estimate.covariance[:6, :6])
         return Track(

@@ -6,6 +6,12 @@ from oracles import relative_scenes as scenes
 from oracles.relative_following import follow
 from scipy.spatial.transform import Rotation
 
+from groundstation.data_sets.relative_case import case_of
+from groundstation.relative_navigation.matching import Centres
+from groundstation.relative_navigation.motion_models import MOTION_MODELS
+from groundstation.relative_navigation.solvers import SOLVERS
+from groundstation.relative_navigation.tracker_settings import Frame
+
 SHORT = np.arange(0.0, 320.0, 4.0)
 
 
@@ -142,3 +148,21 @@ def test_in_a_known_orbit_hill_and_gravity_carry_the_centre_of_mass():
     assert 3.5 < np.mean(squares) < 8.5
     assert np.mean(known) < 0.6
     assert np.mean(known) < 1.05 * np.mean(unknown)
+
+
+@pytest.mark.parametrize("good", [2, 4, 7])
+def test_pictures_of_half_the_size_between_slow_ones_leave_a_covariance_that_is_one(good, rng):
+    """What no motion explains was believed until nothing of the covariance's digits was left."""
+    points = scenes.CUBE + np.array(
+        [[0, 0.1, 0], [0, 0, 0], [0.12, 0, 0], [0, 0, 0.1], [0, 0, 0], [0, 0.05, 0]]
+    )
+    scene, motion = scenes.Scene(points_m=points), scenes.leaving(6, np.arange(14) * 0.1, nearest=4.0)
+    tracker = MOTION_MODELS["hill-euler"](case_of(scene.case(labelled=False)).settings, SOLVERS["lm"]())
+    covariances = np.broadcast_to(0.09 * np.eye(2), (6, 2, 2))
+    for number in range(14):
+        pixels = scene.pixels(motion.rotations[number], motion.positions_m[number])
+        pixels = (0.5 if number >= good else 1.0) * (pixels + rng.normal(0.0, 0.3, (6, 2)))
+        track = tracker.look(Frame(number, 6.7 * number, Centres(pixels, covariances)))
+        if track.pose is not None:
+            assert np.isfinite(track.sigma_position_m + track.sigma_attitude_rad)
+            assert np.linalg.eigvalsh(track.covariance)[0] > 0.0
