@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -52,8 +53,10 @@ def _known_rate(fit: StageFit) -> NDArray[np.float64]:
 def _report(fits: list[StageFit], truth: NDArray[np.float64] | None) -> None:
     known = [fit for fit in fits if fit.converged]
     bad = len(fits) - len(known)
-    aside = f", {bad} without a known rate (nan; left out of what follows): too little is seen of their turn"
+    aside = f", {bad} without a known rate (nan; left out of what follows)"
     print(f"{len(fits)} runs{aside if bad else ''}.")
+    for reason, count in sorted(Counter(fit.reason for fit in fits if fit.reason).items()):
+        print(f"  {reason}: {count}")
     if not known:
         return
     rates = np.degrees([fit.rate_rad_s for fit in known])

@@ -23,6 +23,8 @@ from groundstation.relative_navigation.target import MOST_POINTS, check_points
 Floats = NDArray[np.float64]
 
 COLUMNS = ("run", "t", "marker", "u", "v")
+LEAST_SIGMA_PX, MOST_SIGMA_PX = 1e-6, 100.0
+"""Of pixels: none is without any error, and a rate made of pixels without one would have no sigma."""
 _PLACE = re.compile(r"at \(\s*([-+.\deE]+)\s*\+\s*([.\deE]*)\s*\*?\s*t\s*,\s*0\s*,\s*0\s*\)")
 """How a file words a camera that leaves: ``at (2+t,0,0)``, ``at (0.5+0.3*t,0,0)``."""
 
@@ -73,8 +75,6 @@ def _markers(found: Mapping[str, Any]) -> Floats:
 
 def _camera(found: Mapping[str, Any]) -> LeavingCamera:
     f_px = number(found, "f_px")
-    if not f_px > 0.0:
-        raise ValueError(f"f_px is {f_px:g}, expected above 0")
     if "camera_start_m" in found:
         return LeavingCamera(f_px, number(found, "camera_start_m"), number(found, "camera_speed_m_s"))
     words = found.get("camera")
@@ -85,9 +85,10 @@ def _camera(found: Mapping[str, Any]) -> LeavingCamera:
             "camera_speed_m_s"
         )
     try:
-        return LeavingCamera(f_px, float(place[1]), float(place[2] or 1.0))
+        start_m, speed_m_s = float(place[1]), float(place[2] or 1.0)
     except ValueError as error:
         raise ValueError(f"camera: no numbers in '{place[0]}'") from error
+    return LeavingCamera(f_px, start_m, speed_m_s)
 
 
 def _sigma(found: Mapping[str, Any], runs: Path) -> float:
@@ -100,9 +101,9 @@ def _sigma(found: Mapping[str, Any], runs: Path) -> float:
 
 
 def _positive(sigma: float) -> float:
-    if not sigma >= 0.0:
-        raise ValueError(f"sigma_px is {sigma:g}, expected 0 or more")
-    return max(sigma, 1e-4)
+    if not LEAST_SIGMA_PX <= sigma <= MOST_SIGMA_PX:
+        raise ValueError(f"sigma_px is {sigma:g}, expected {LEAST_SIGMA_PX:g} to {MOST_SIGMA_PX:g}")
+    return sigma
 
 
 def read_runs(path: Path, stage: Stage) -> dict[int, StageRun]:
@@ -128,6 +129,13 @@ def read_runs(path: Path, stage: Stage) -> dict[int, StageRun]:
         own = rows[rows[:, 0] == name]
         if len(np.unique(own[:, 1])) < 2 or len(own) < 6:
             raise FileError(f"{path}: run {name:g} shows fewer than two frames or six markers: no rate.")
+        nearest_m = stage.camera.start_m + float((stage.camera.speed_m_s * own[:, 1]).min())
+        reach_m = float(np.linalg.norm(stage.markers_m, axis=1).max())
+        if not nearest_m > reach_m:
+            raise FileError(
+                f"{path}: run {name:g}: the camera is {nearest_m:g} m from the stage's middle, where markers "
+                f"{reach_m:g} m from it may be behind it: check camera_start_m, camera_speed_m_s and t."
+            )
         shown, times = np.unique(own[:, 1:3], axis=0, return_counts=True)
         if times.max() > 1:
             t_s, marker = shown[times.argmax()]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from groundstation.relative_navigation.precession import AxialInertia, precess
 from groundstation.relative_navigation.rotations import turn
@@ -23,6 +24,13 @@ REST = 1e-8
 _STEPS = np.array((1e-6, 1e-6, 1e-6, 1e-7, 1e-7, 1e-7))
 """For differences: turn rad, rate rad/s."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e12
+MOST_F_PX, FARTHEST_M, FASTEST_M_S = 1e6, 1e5, 1e4
+"""Of a camera that leaves."""
+WORST_MISFIT = 9.0
+"""Mean square of the residuals over their sigmas, beyond which the pixels are none of the stage."""
+BY_CHANCE = 1e-4
+"""How seldom noise alone misfits by so much that the covariance is widened."""
+NO_REST = "the search did not come to rest, or too little is seen of the turn"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,11 +41,23 @@ class LeavingCamera:
         f_px: Focal length.
         start_m: Place on the axis at time 0.
         speed_m_s: Of leaving.
+
+    Raises:
+        ValueError: A number that no such camera has.
     """
 
     f_px: float
     start_m: float
     speed_m_s: float
+
+    def __post_init__(self) -> None:
+        for name, value, most in (
+            ("f_px", self.f_px, MOST_F_PX), ("camera_start_m", self.start_m, FARTHEST_M),
+        ):  # fmt: skip
+            if not 0.0 < value <= most:
+                raise ValueError(f"{name} is {value:g}, expected above 0 and at most {most:g}")
+        if not abs(self.speed_m_s) <= FASTEST_M_S:
+            raise ValueError(f"camera_speed_m_s is {self.speed_m_s:g}, expected at most {FASTEST_M_S:g}")
 
     def project(self, points_m: Floats, times_s: Floats) -> Floats:
         """Return pixels (n, 2) of points (n, 3), inertial axes, each at its own time (n,)."""
@@ -85,7 +105,8 @@ class StageFit:
         start: Inertial from body at time 0, (3, 3).
         covariance: Of turn (inertial axes, rad) and rate, (6, 6); NaN where the run does not tell.
         rms_px: Root of the mean squared residual.
-        converged: Whether it came to rest, and no faster turn can be meant.
+        converged: Whether it came to rest, is known, and the pixels are those of the stage.
+        reason: Why not, or empty.
     """
 
     rate_rad_s: Floats
@@ -93,6 +114,7 @@ class StageFit:
     covariance: Floats
     rms_px: float
     converged: bool
+    reason: str = ""
 
 
 def fit_stage(stage: Stage, run: StageRun, sigma_px: float, start: Floats | None = None) -> StageFit:
@@ -148,4 +170,13 @@ def fit_stage(stage: Stage, run: StageRun, sigma_px: float, start: Floats | None
     known = bool(np.linalg.cond(scaled) < 1e12)
     covariance = np.linalg.inv(scaled) * scale * scale[:, None] if known else np.full((6, 6), np.nan)
     rms = sigma_px * float(np.sqrt(cost / off.size))
-    return StageFit(rate, attitude, covariance, rms, converged and known)
+    if not (converged and known and np.isfinite(cost)):
+        return StageFit(rate, attitude, np.full((6, 6), np.nan), rms, converged=False, reason=NO_REST)
+    freedom = off.size - 6
+    misfit = cost / max(1, freedom)
+    if misfit > WORST_MISFIT:
+        words = f"the pixels miss the stage by more than {WORST_MISFIT**0.5:g} sigma_px"
+        return StageFit(rate, attitude, np.full((6, 6), np.nan), rms, converged=False, reason=words)
+    if freedom > 0 and cost > float(chi2.isf(BY_CHANCE, freedom)):
+        covariance = misfit * covariance  # the pixels are worse than their file tells
+    return StageFit(rate, attitude, covariance, rms, converged=True)

@@ -117,7 +117,11 @@ def test_the_command_gives_a_rate_for_every_run(groundstation, files, tmp_path):
         ({"markers_m": [[0, 0, 0], [1e9, 0, 0], [0, 2, 0]]}, "markers_m must be finite and at most 1000 m"),
         ({"camera": "somewhere"}, "camera must tell"),
         ({"f_px": 0}, "f_px"),
+        ({"f_px": 1e308}, "f_px"),
+        ({"camera_start_m": 0, "camera_speed_m_s": 1.0}, "camera_start_m is 0"),
+        ({"camera_start_m": 0.2, "camera_speed_m_s": 0.0}, "the camera is 0.2 m from the stage's middle"),
         ({"sigma_px": {"3frames": "much"}}, "sigma_px.3frames"),
+        ({"sigma_px": 0}, "sigma_px is 0, expected"),
     ],
     ids=str,
 )
@@ -150,7 +154,32 @@ def test_an_unknown_rate_is_nan_and_no_part_of_the_statistics(groundstation, fil
     files[1].write_text(files[1].read_text() + nowhere)
     after = groundstation(*words).output.splitlines()
     assert after[0].startswith("4 runs, 1 without a known rate")
-    assert after[1:] == before[1:]
+    assert "did not come to rest" in after[1]
+    assert after[2:] == before[1:]
     assert out.read_text().splitlines()[-1] == "9,nan,nan,nan"
     files[1].write_text("run,t,marker,u,v\n" + nowhere)
-    assert len(groundstation(*words).output.splitlines()) == 1
+    assert len(groundstation(*words).output.splitlines()) == 2
+
+
+def test_pixels_of_nothing_give_no_rate(groundstation, files, tmp_path, rng):
+    lines = ["run,t,marker,u,v"]
+    for run, scatter_px in enumerate((300.0, 30.0)):
+        for t_s in (0.0, 0.5, 1.0):
+            for marker, (u, v) in enumerate(rng.uniform(-scatter_px, scatter_px, (6, 2))):
+                lines.append(f"{run},{t_s},{marker},{u},{v}")
+    files[1].write_text("\n".join(lines) + "\n")
+    said = groundstation("relative", "spin", files[0], "--pixels", files[1], "--out", tmp_path / "rates.csv")
+    rows = (tmp_path / "rates.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[1:] for row in rows] == [["nan"] * 3] * 2
+    assert "2 without a known rate" in said.output
+    assert "the pixels miss the stage by more than 3 sigma_px: " in said.output
+
+
+def test_pixels_that_are_worse_than_stated_widen_the_covariance(rng):
+    run = run_of(exact([0.0, 0.5, 1.0]))
+    noisy = StageRun(run.times_s, run.marker, run.pixels + rng.normal(0.0, 2.0, run.pixels.shape))
+    stated, true = fit_stage(STAGE, noisy, 1.0), fit_stage(STAGE, noisy, 2.0)
+    assert stated.converged
+    assert np.sqrt(np.diag(stated.covariance) / np.diag(true.covariance)) == pytest.approx(
+        np.ones(6), rel=0.35
+    )
