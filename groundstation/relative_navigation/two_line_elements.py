@@ -39,8 +39,8 @@ _NEAR_SHARE = 0.05
 _CIRCULAR = 0.1
 """So eccentric an orbit is still near a circular one."""
 LIMITS = (
-    f"They need distances within {_NEAR_SHARE:.0%} of the orbit's radius, and an eccentricity of at most "
-    f"{_CIRCULAR:g}."
+    f"They need distances within {_NEAR_SHARE:.0%} of the orbit's radius, relative velocities within as much "
+    f"of the orbital one, and an eccentricity of at most {_CIRCULAR:g}."
 )
 """Of the constants, for people."""
 _CAME_DOWN = 6
@@ -219,7 +219,12 @@ def relative_state(first: TwoLineElements, second: TwoLineElements, when: dateti
     spin = np.array((0.0, 0.0, rate))
     speed = axes @ (other_velocity - velocity) - np.cross(spin, away)
     radius = float(np.linalg.norm(position))
-    is_near = float(np.linalg.norm(away)) <= _NEAR_SHARE * radius and first.eccentricity <= _CIRCULAR
+    reach_m = _NEAR_SHARE * radius
+    is_near = (
+        float(np.linalg.norm(away)) <= reach_m
+        and float(np.linalg.norm(speed)) <= reach_m * first.mean_motion_rad_s
+        and first.eccentricity <= _CIRCULAR
+    )
     constants = hill_constants(away, speed, first.mean_motion_rad_s) if is_near else None
     height = radius - EARTH_RADIUS_M
     return RelativeState(when, away, speed, rate, constants, height)

@@ -222,6 +222,16 @@ def test_a_higher_object_falls_behind_by_its_first_constant():
     assert found.drift_m_rev == pytest.approx(lag, rel=0.03)
 
 
+def test_a_retrograde_companion_has_no_hill_constants():
+    """At one place, and twice the orbital velocity apart."""
+    other = signed(PROGRESS[1][:8] + f"{180.0 - float(PROGRESS[1][8:16]):8.4f}" + PROGRESS[1][16:])
+    first, second = parse_elements(text(PROGRESS, (PROGRESS[0], other)))
+    states = [relative_state(first, second, first.epoch + timedelta(minutes=k)) for k in range(0, 95, 1)]
+    near = min(states, key=lambda state: np.linalg.norm(state.position_m))
+    assert all(state.constants is None for state in states)
+    assert np.linalg.norm(near.velocity_m_s) > 1000.0
+
+
 def test_elements_too_old_for_the_moment_are_refused():
     first, second = parse_elements(text(PROGRESS, PROGRESS))
     with pytest.raises(ValueError, match="31 days from the epoch"):
