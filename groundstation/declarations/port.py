@@ -56,12 +56,15 @@ class Port(ABC):
         address: Where the rig gives it is opened.
         reads: Class of the payloads that come in here.
         delivery: Whether a slow process sees every item or only the newest.
+        carries: What travels here, in the word of a laboratory's channels: ``bytes``, ``camera``, ``can``;
+            empty where any may.
         is_optional: A laboratory without that channel is no mistake.
         is_first: What it reads first is delivered before anything else, in real time.
     """
 
     reads: ClassVar[type[Message]]
     delivery: ClassVar[Delivery] = Delivery.EVERY
+    carries: ClassVar[str] = ""
     is_optional: ClassVar[bool] = False
     is_first: ClassVar[bool] = False
 

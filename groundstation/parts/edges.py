@@ -74,6 +74,7 @@ class CameraEdge(Edge):
 class GreyCameraPort(Port):
     """Grey pictures of a vehicle's camera as they arrive, of the class ``reads``; only the newest counts."""
 
+    carries = "camera"
     delivery = Delivery.NEWEST
 
     timeout_s: float

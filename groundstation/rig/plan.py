@@ -185,11 +185,15 @@ def check_plan(rig: Rig) -> None:
         raise RigError(f"'{min(taken)}' has a meaning on the bus: choose another vehicle name")
 
 
-def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
+def laboratory_ports(rig: Rig, channels: Collection[str] | Mapping[str, str]) -> list[Port]:
     """The rig's ports under the names that its laboratory gives their channels, for virtual time.
 
+    Args:
+        rig: The rig.
+        channels: Of the laboratory, with what each carries.
+
     Raises:
-        RigError: The laboratory has no such channel, or a device is real.
+        RigError: The laboratory has no such channel, it carries something else, or a device is real.
     """
     found = []
     for port, _ in ports_of(rig):
@@ -202,6 +206,12 @@ def laboratory_ports(rig: Rig, channels: Collection[str]) -> list[Port]:
         if port.is_optional and channel not in channels:
             continue
         _check_channel(channel, channels)
+        kind = channels[channel] if isinstance(channels, Mapping) else port.carries
+        if port.carries not in ("", kind):
+            raise RigError(
+                f"{port.channel}: {address!r} carries {kind} in this laboratory, expected {port.carries}: "
+                "give the address of another channel"
+            )
         found.append(replace(port, channel=channel))
     return found
 

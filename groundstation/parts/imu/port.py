@@ -31,6 +31,7 @@ class ImuPort(Port):
     """Bytes in both directions; the stamp is the arrival of the last byte of a read."""
 
     reads = ImuBytes
+    carries = "bytes"
 
     baud: int
 

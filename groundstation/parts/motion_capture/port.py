@@ -28,6 +28,7 @@ class CapturePort(Port):
     """Poses of the rigid bodies of all vehicles."""
 
     reads = CapturedPose
+    carries = "poses"
 
     bodies: tuple[str, ...]
     timeout_s: float

@@ -15,6 +15,7 @@ class OverheadCameraPort(Port):
     """Colour pictures as they arrive, of no vehicle; only the newest counts."""
 
     reads = OverheadImage
+    carries = "camera"
     delivery = Delivery.NEWEST
 
     timeout_s: float

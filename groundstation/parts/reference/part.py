@@ -25,6 +25,7 @@ class ReferencePort(Port):
     """A stream of poses."""
 
     reads = ReferenceBytes
+    carries = "bytes"
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, bytes)

@@ -20,6 +20,7 @@ class FixStreamPort(Port):
     """An external pose stream whose poses serve as fixes."""
 
     reads = FixBytes
+    carries = "bytes"
 
     def to_message(self, stamp_ns: int, data: object) -> Message:
         assert isinstance(data, bytes)

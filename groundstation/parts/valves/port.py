@@ -32,6 +32,7 @@ class ValveBus(Port):
     """Frames of all vehicles in both directions."""
 
     reads = CanIn
+    carries = "can"
 
     vehicles: tuple[str, ...]
 

@@ -132,3 +132,13 @@ def test_a_channel_may_have_another_name_in_the_laboratory():
     rig = rig_with(DRAWN, **{"laboratory:alpha/imu": "laboratory:spare/imu"})
     names = ["valve_bus", "spare/imu", "alpha/fixes", "alpha/reference"]
     assert {port.channel for port in laboratory_ports(rig, names)} == set(names)
+
+
+def test_a_channel_that_carries_something_else_is_refused():
+    rig = load_rig(DRAWN.with_name("side_camera.toml"))
+    kinds = {port.address.removeprefix("laboratory:"): port.carries for port, _ in ports_of(rig)}
+    kinds["beta/side_camera"] = "bytes"
+    with pytest.raises(
+        RigError, match=r"beta/side_camera: .* carries bytes in this laboratory, expected camera"
+    ):
+        laboratory_ports(rig, kinds)
