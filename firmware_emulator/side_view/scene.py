@@ -9,6 +9,10 @@ from typing import Any
 from firmware_emulator.scene_files import CameraFile, is_number, read_tables
 
 _MOST_PX, _FARTHEST_M, _MOST_RAD = 1e5, 100.0, 7.0
+_MOST_PIXELS = 50_000_000
+"""Of a picture: more are no camera's, and fill the memory."""
+_LEAST_M = 0.005
+"""Of a hull's radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,8 @@ class SideOptics:
             raise ValueError("width, height, focal length and height above the table must be positive")
         if max(self.width_px, self.height_px, self.focal_px, *map(abs, self.centre_px)) > _MOST_PX:
             raise ValueError(f"sizes must be below {_MOST_PX:g} px")
+        if self.width_px * self.height_px > _MOST_PIXELS:
+            raise ValueError(f"width times height must be below {_MOST_PIXELS} pixels")
         if max(map(abs, self.position_body_m)) > _FARTHEST_M or abs(self.yaw_rad) > _MOST_RAD:
             raise ValueError("position_body_m is in metres, yaw_rad in radians")
 
@@ -73,8 +79,8 @@ class Hull:
     marker_radius_m: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.radius_m < _FARTHEST_M and 0.0 <= self.bottom_m < self.top_m < _FARTHEST_M):
-            raise ValueError("a hull needs a positive radius_m, and bottom_m below top_m")
+        if not (_LEAST_M <= self.radius_m < _FARTHEST_M and 0.0 <= self.bottom_m < self.top_m < _FARTHEST_M):
+            raise ValueError(f"a hull needs a radius_m of {_LEAST_M:g} or more, and bottom_m below top_m")
         if self.markers and not 0.0 < self.marker_radius_m < self.radius_m:
             raise ValueError("markers need a marker_radius_m above 0, below that of the hull")
         if any(abs(marker.height_m) > _FARTHEST_M for marker in self.markers):

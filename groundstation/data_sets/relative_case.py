@@ -21,6 +21,7 @@ from groundstation.files.json_file import parse_json
 from groundstation.files.reading import read_bytes
 from groundstation.files.toml_file import parse_toml
 from groundstation.files.values import check_amount, number, numbers, whole_number
+from groundstation.relative_navigation.hypotheses import MOST
 from groundstation.relative_navigation.motion import CameraCraft
 from groundstation.relative_navigation.pinhole import PinholeCamera
 from groundstation.relative_navigation.pose import Pose
@@ -95,6 +96,8 @@ def case_of(found: Mapping[str, Any]) -> RelativeCase:
         if not 0.0 < reach <= 1e5:
             raise ValueError(f"eps_px is {reach:g}, expected above 0")
     settings = TrackerSettings(camera_of(found), _target(found), _guess(found), reach, _craft(found))
+    if not labelled and not found.get("markers"):
+        _check_turns(settings.target)
     return RelativeCase(settings, max(sigma, LEAST_SIGMA_PX), labelled, diameter, found)
 
 
@@ -130,6 +133,15 @@ def _target(found: Mapping[str, Any]) -> Target:
     inertia = np.array(numbers(found, "inertia", 3)) if found.get("inertia") is not None else None
     offset = np.array(numbers(found, "centre_of_mass_m", 3)) if "centre_of_mass_m" in found else None
     return Target(np.array(rows), inertia, offset)
+
+
+def _check_turns(target: Target) -> None:
+    alike = 1 + len(target.symmetries)
+    if alike > MOST:
+        raise ValueError(
+            f"points_m look the same after {alike - 1} turns, and at most {MOST} poses that look alike are "
+            "followed: move a point, or tell points apart (labelled, or markers of several colours)"
+        )
 
 
 def _guess(found: Mapping[str, Any]) -> Pose | None:

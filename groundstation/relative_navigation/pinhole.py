@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 MOST_PX = 1e5
+MOST_PIXELS = 50_000_000
+"""Of a picture: no camera for motion has more, and each is held in memory several times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,11 @@ class PinholeCamera:
             value = getattr(self, name)
             if not least <= value <= MOST_PX:
                 raise ValueError(f"{name} is {value:g}, expected {least:g} to {MOST_PX:g}")
+        if self.width_px * self.height_px > MOST_PIXELS:
+            raise ValueError(
+                f"width_px x height_px is {self.width_px} x {self.height_px}, expected at most {MOST_PIXELS} "
+                "pixels in all"
+            )
         for name in ("cx_px", "cy_px"):
             if not abs(getattr(self, name)) <= MOST_PX:
                 raise ValueError(f"{name} is {getattr(self, name):g}, expected at most {MOST_PX:g}")

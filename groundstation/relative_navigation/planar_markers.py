@@ -28,6 +28,9 @@ CENTRE_FLOOR_PX = 0.012
 """What the model of a disk leaves of the picture of a round sticker on a curved hull."""
 HIGHER_M = 0.03
 """A marker nearer to the camera's own height says nothing of the depth by itself."""
+MOST_PAIRS, MOST_JUDGED = 200_000, 6_000_000
+"""Pairs of spots taken for markers, and marker images that are compared with spots; beyond, every so many-th
+is looked at: enough of a body that shows many markers is left, and a picture takes a bounded time."""
 APART_M = 0.025
 """By how much the distance of two places may differ from that of their markers."""
 GRAZING = 0.12
@@ -126,7 +129,7 @@ class _Search:
         depth = depth_m[spot, marker]
         across = depth * (self._centres.pixels[spot, 0] - lens.cx_px) / lens.f_px
         places = self._eye[:2] + across[:, None] * self._right + depth[:, None] * self._ahead
-        first, second = np.triu_indices(len(spot), 1)
+        first, second = pairs_of(len(spot))
         other = (spot[first] != spot[second]) & (marker[first] != marker[second])
         first, second = first[other], second[other]
         seen = places[second] - places[first]
@@ -147,12 +150,14 @@ class _Search:
         """Those of many poses that explain the most spots, as far as one look tells; at most some dozens."""
         if not len(starts):
             return np.empty(0, np.int64)
+        every = 1 + len(starts) * len(self._points) * len(self._centres) // MOST_JUDGED
+        starts = starts[::every]
         pixels, faces = self._predicted(starts)
         off = np.abs(pixels[:, :, None] - self._centres.pixels[None, None]).max(axis=3)
         off[~faces] = np.inf
         explained = (off.min(axis=1) < 2.0 * GATE_PX).sum(axis=1)
         order = np.argsort(-explained, kind="stable")[: 8 * CANDIDATES]
-        found: Ints = order[explained[order] >= FEWEST]
+        found: Ints = every * order[explained[order] >= FEWEST]
         return found
 
     def _predicted(self, poses: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -257,6 +262,13 @@ class _Search:
         s = wide_m**2 * ((across * c + depth * q) / (4.0 * radius_m * facing) - q / depth)
         scale = s * self._camera.lens.f_px / depth
         return np.column_stack((scale * (c - q * across / depth), -scale * q * above / depth))
+
+
+def pairs_of(count: int) -> tuple[Ints, Ints]:
+    """Return two of so many, each pair once; of more than `MOST_PAIRS` every so many-th."""
+    first, second = np.triu_indices(count, 1)
+    every = 1 + len(first) // MOST_PAIRS
+    return first[::every], second[::every]
 
 
 def _is_near(one: Floats, other: Floats) -> bool:

@@ -22,10 +22,13 @@ FEWEST_MARKERS = 3
 MOST_MARKERS = 64
 LEAST_APART_M = 0.02
 """Between two markers: nearer ones melt into one spot."""
+ALIKE_M = 0.003
+"""Markers that a turn brings so near to others are the same pattern again."""
 INWARD_RATIO = 0.125
 """By this times the square of its radius over the hull's, a round sticker's light is nearer to the axis than
 the surface: the mean of 1 - cos s over a disk."""
-_MOST_M = 10.0
+_LEAST_M, _MOST_M = 0.005, 10.0
+"""Of a body's radius and height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +59,12 @@ class SideBody:
     def __post_init__(self) -> None:
         for key in ("radius_m", "bottom_m", "top_m", "marker_radius_m"):
             check_amount(f"{self.vehicle}.{key}", getattr(self, key), _MOST_M, "is it in mm?")
-        if not self.radius_m > 0.0:
-            raise ValueError(f"{self.vehicle}.radius_m must be above 0")
+        if not self.radius_m >= _LEAST_M:
+            raise ValueError(f"{self.vehicle}.radius_m is {self.radius_m:g}, expected at least {_LEAST_M:g}")
         if not 0.0 <= self.bottom_m < self.top_m:
             raise ValueError(f"{self.vehicle}: bottom_m must be at least 0 and below top_m")
+        if not self.top_m - self.bottom_m >= _LEAST_M:
+            raise ValueError(f"{self.vehicle}: top_m must be at least {_LEAST_M:g} above bottom_m")
         if self.azimuths_rad:
             self._check_markers()
 
@@ -87,6 +92,24 @@ class SideBody:
                 f"{self.vehicle}.markers: all in one upright plane, which looks alike turned to either side: "
                 "spread them around the hull"
             )
+        turn_rad = self._repeats_after()
+        if turn_rad:
+            raise ValueError(
+                f"{self.vehicle}.markers: turned by {math.degrees(turn_rad):.0f} deg they are the same "
+                "pattern again, so no turn is seen: move some of them, or change their heights"
+            )
+
+    def _repeats_after(self) -> float:
+        """A turn that maps all markers on each other, rad; 0 if none does."""
+        azimuth, height = np.array(self.azimuths_rad), np.array(self.heights_m)
+        reach_m = self.radius_m
+        for turn in (azimuth - azimuth[0])[1:].tolist():
+            off = azimuth[:, None] + turn - azimuth[None]
+            off_m = reach_m * np.abs((off + math.pi) % math.tau - math.pi)
+            gaps_m = np.hypot(off_m, height[:, None] - height[None])
+            if abs(math.remainder(turn, math.tau)) * reach_m > ALIKE_M and gaps_m.min(axis=1).max() < ALIKE_M:
+                return math.remainder(turn, math.tau) % math.tau
+        return 0.0
 
     def points_body_m(self) -> Floats:
         """Where the light of each marker is centred in the body frame, (n, 3), z above the table."""

@@ -246,6 +246,17 @@ def test_options_that_do_not_go_together_are_refused(call, film, tmp_path):
         call("track", tmp_path / "small.json", "--video", folder / "film.avi", "--out", out)
 
 
+def test_points_that_look_alike_in_many_turns_are_refused(call, film, tmp_path):
+    folder, _ = film
+    angles = np.arange(12) * (2.0 * np.pi / 12)
+    ring = np.column_stack((np.cos(angles), np.sin(angles), 0.0 * angles)).tolist()
+    case = json.loads((folder / "case.json").read_text()) | {"points_m": ring}
+    (tmp_path / "ring.json").write_text(json.dumps(case))
+    words = ("--video", folder / "film.avi", "--out", tmp_path / "p.csv")
+    with pytest.raises(FileError, match="points_m look the same after 23 turns, and at most 4 poses"):
+        call("track", tmp_path / "ring.json", *words)
+
+
 def test_a_target_file_is_made_from_clicks_and_lengths(call, film, tmp_path):
     folder, motion = film
     pixels = scenes.Scene(points_m=POINTS).pixels(motion.rotations[0], motion.positions_m[0])

@@ -8,7 +8,8 @@ import pytest
 
 from groundstation.files.errors import FileError
 from groundstation.relative_navigation.matching import Centres
-from groundstation.relative_navigation.planar_markers import find_by_markers
+from groundstation.relative_navigation.pinhole import PinholeCamera
+from groundstation.relative_navigation.planar_markers import MOST_PAIRS, find_by_markers, pairs_of
 from groundstation.relative_navigation.side_bodies import SideBody, load_side_bodies
 from groundstation.relative_navigation.side_looks import LOOKS
 from groundstation.relative_navigation.sighting import Seen, Unseen
@@ -104,11 +105,18 @@ def test_too_few_and_too_many_spots_are_refused_with_their_number():
 
 def test_a_pattern_that_repeats_is_ambiguous_and_gives_no_pose():
     turns = tuple(math.radians(45.0 * step) for step in range(8))
-    alike = SideBody("alike", 0.15, 0.06, 0.34, turns, (0.30, 0.10) * 4, 0.01)
+    heights = (0.20, *(0.10, 0.30) * 3, 0.10)  # the one that differs is on the far side
+    alike = SideBody("alike", 0.15, 0.06, 0.34, turns, heights, 0.01)
     answer = find_by_markers(CAMERA, alike, centres(spots_of(pose_at(1.5, 0.0, 0.2), alike)))
     assert isinstance(answer, Unseen)
     assert answer.is_ambiguous
     assert answer.reason == "two poses of alike explain the spots alike"
+
+
+def test_the_work_in_one_picture_is_bounded():
+    first, second = pairs_of(2560)  # 40 spots, 64 markers
+    assert len(first) == len(second) <= MOST_PAIRS
+    assert len(pairs_of(300)[0]) == 300 * 299 // 2
 
 
 @pytest.mark.parametrize(
@@ -119,6 +127,8 @@ def test_a_pattern_that_repeats_is_ambiguous_and_gives_no_pose():
         ([(0.0, 0.3), (20.0, 0.1)], "2 of them, expected 3"),
         ([(0.0, 0.3), (0.5, 0.3), (20.0, 0.1)], "less than 20 mm apart"),
         ([(0.0, 0.5), (40.0, 0.3), (20.0, 0.1)], "between bottom_m and top_m"),
+        ([(5.625 * k, 0.3) for k in range(64)][::2], "they are the same pattern again"),
+        ([(90.0 * k, z) for k in range(4) for z in (0.3, 0.1)], "turned by 90 deg they are the same pattern"),
     ],
 )
 def test_markers_that_give_no_pose_are_refused_when_the_file_is_read(tmp_path, markers, said):
@@ -129,6 +139,13 @@ def test_markers_that_give_no_pose_are_refused_when_the_file_is_read(tmp_path, m
     )
     with pytest.raises(FileError, match=said):
         load_side_bodies(path)
+
+
+def test_sizes_of_nothing_are_refused():
+    with pytest.raises(ValueError, match=r"a\.radius_m is 1e-300, expected at least 0\.005"):
+        SideBody("a", 1e-300, 0.06, 0.34)
+    with pytest.raises(ValueError, match="expected at most 50000000 pixels in all"):
+        PinholeCamera(780.0, 318.0, 241.0, 100_000, 100_000)
 
 
 def test_dark_pictures_and_the_lamp_in_view_give_a_sentence():
