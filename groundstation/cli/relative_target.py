@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import base64
+import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import cv2
 import typer
 
+from groundstation.data_sets.relative_case import MOST_DIAMETER_M
 from groundstation.data_sets.relative_target_file import ClickedPoint, target_toml
 from groundstation.data_sets.star_folder import read_frame
 from groundstation.declarations.errors import UsageError
@@ -26,7 +29,7 @@ const source=document.getElementById("source"),canvas=document.getElementById("p
 function draw(){{canvas.width=source.naturalWidth;canvas.height=source.naturalHeight;
 const pen=canvas.getContext("2d");pen.drawImage(source,0,0);pen.strokeStyle=pen.fillStyle="#0f0";
 points.forEach((p,i)=>{{pen.beginPath();pen.arc(p.u+.5,p.v+.5,6,0,7);pen.stroke();pen.fillText(i,p.u+9,p.v-4)}});
-document.getElementById("call").textContent="{call} "+
+document.getElementById("call").textContent={call}+" "+
 points.map(p=>"--point "+[p.u.toFixed(1),p.v.toFixed(1),p.x,p.y,p.z].join(",")).join(" ")}}
 function row(p,i){{const line=document.createElement("tr");
 line.innerHTML="<td>"+i+"<td>"+p.u.toFixed(1)+"<td>"+p.v.toFixed(1);
@@ -70,16 +73,25 @@ def target(
         if out.suffix.lower() not in (".html", ".htm"):
             raise UsageError("without --point a page to click on is made: give --out PAGE.html.")
         data = cv2.imencode(".png", image)[1].tobytes()
-        call = f"groundstation relative target {picture.name} --out target.toml --f-px 750"
-        write_file(out, _PAGE.format(picture=base64.b64encode(data).decode("ascii"), call=call))
+        write_file(out, _PAGE.format(picture=base64.b64encode(data).decode("ascii"), call=_call(picture)))
         print(f"{out}: open it in a browser and click the points.")
         return
+    if tip_diameter_m is not None and not 0.0 < tip_diameter_m <= MOST_DIAMETER_M:
+        raise UsageError(
+            f"--tip-diameter-m must be above 0 and at most {MOST_DIAMETER_M:g}, found {tip_diameter_m:g}."
+        )
     if f_px is None:
         raise UsageError("give --f-px, the focal length in pixels (`groundstation calibrate lens` finds it).")
     clicked = [_clicked(text, image.shape[1], image.shape[0]) for text in point]
     text, words = target_toml(image, clicked, f_px, tip_diameter_m, learns_colours=colours)
     write_file(out, text)
     print(words)
+
+
+def _call(picture: Path) -> str:
+    """The command to run next, as a string of the page's script; a shell takes it as it stands."""
+    words = ("groundstation", "relative", "target", str(picture), "--out", "target.toml", "--f-px", "750")
+    return json.dumps(shlex.join(words)).replace("<", "\\u003c")  # no name ends the script
 
 
 def _clicked(text: str, width: int, height: int) -> ClickedPoint:

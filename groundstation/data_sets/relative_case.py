@@ -35,6 +35,8 @@ LEAST_SIGMA_PX = 1e-4
 """A case without noise is still written with so many digits."""
 MOST_SIGMA_PX = 100.0
 DEFAULT_SIGMA_PX = 0.3
+MOST_DIAMETER_M = 10.0
+"""Of a tip."""
 MOST_RATE_RAD_S = 0.01
 """Of an orbit: no body has a faster one but close to something dense."""
 _UNIT = 1e-3
@@ -88,8 +90,8 @@ def case_of(found: Mapping[str, Any]) -> RelativeCase:
     diameter = None
     if "tip_diameter_m" in found:
         diameter = number(found, "tip_diameter_m")
-        if not 0.0 < diameter <= 10.0:
-            raise ValueError(f"tip_diameter_m is {diameter:g}, expected above 0 to 10")
+        if not 0.0 < diameter <= MOST_DIAMETER_M:
+            raise ValueError(f"tip_diameter_m is {diameter:g}, expected above 0 to {MOST_DIAMETER_M:g}")
     reach = None
     if "eps_px" in found:
         reach = number(found, "eps_px")

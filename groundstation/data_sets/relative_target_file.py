@@ -88,9 +88,17 @@ def _check(
 ) -> tuple[str, dict[str, list[float]] | None]:
     pixels = np.array([point.pixel for point in points])
     sight = Sight(np.arange(len(points)), pixels, 1.0 / CLICK_PX)
-    fits = best_of(camera, target, sight, cold_starts(camera, target, sight)) if len(points) >= 4 else []
-    if not fits:
+    if len(points) < 4:
         return f"{len(points)} points written; four or more would be checked by a pose.", None
+    apart_px = np.linalg.norm(pixels[:, None] - pixels[None], axis=2)[np.triu_indices(len(points), 1)]
+    if float(apart_px.min()) < CLICK_PX:
+        return f"{len(points)} points written; two clicks are in one place, so no pose checks them.", None
+    fits = best_of(camera, target, sight, cold_starts(camera, target, sight))
+    if not fits:
+        return (
+            f"{len(points)} points written; no pose fits the clicks: one of them, or a length, is wrong.",
+            None,
+        )
     fit = fits[0]
     residual = CLICK_PX * math.sqrt(fit.cost / (2.0 * len(points)))
     x, y, z = fit.pose.position_camera_m.tolist()

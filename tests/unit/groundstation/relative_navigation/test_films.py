@@ -3,6 +3,7 @@
 import csv
 import json
 import resource
+import shlex
 import tomllib
 
 import cv2
@@ -246,6 +247,20 @@ def test_options_that_do_not_go_together_are_refused(call, film, tmp_path):
         call("track", tmp_path / "small.json", "--video", folder / "film.avi", "--out", out)
 
 
+def test_the_call_on_the_page_is_one_for_a_shell_whatever_the_name(call, film, tmp_path):
+    odd = tmp_path / "a folder"
+    odd.mkdir()
+    picture = odd / 'my "tips" </script> $HOME.png'.replace("/", "")
+    picture.write_bytes((film[0] / "frames" / "000.png").read_bytes())
+    call("target", picture, "--out", tmp_path / "click.html")
+    page = (tmp_path / "click.html").read_text()
+    (line,) = [row for row in page.splitlines() if '.textContent="groundstation' in row]
+    said = json.loads(line[line.index('="') + 1 : line.rindex('+" "+')])
+    words = ["groundstation", "relative", "target", str(picture), "--out", "target.toml", "--f-px", "750"]
+    assert shlex.split(said) == words
+    assert "<" not in line
+
+
 def test_points_that_look_alike_in_many_turns_are_refused(call, film, tmp_path):
     folder, _ = film
     angles = np.arange(12) * (2.0 * np.pi / 12)
@@ -283,5 +298,14 @@ def test_a_target_file_is_made_from_clicks_and_lengths(call, film, tmp_path):
     ):
         with pytest.raises(UsageError, match=sentence):
             call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *bad)
+    for diameter in ("0", "-1", "1e308", "nan"):
+        with pytest.raises(UsageError, match="--tip-diameter-m must be above 0 and at most 10"):
+            call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *words,
+                 "--tip-diameter-m", diameter)  # fmt: skip
+    one_pixel = [
+        f"320,240,{x},{y},{z}" if k % 2 else "--point" for k, (x, y, z) in enumerate(np.repeat(POINTS, 2, 0))
+    ]
+    said = call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *one_pixel)
+    assert "two clicks are in one place, so no pose checks them" in said.output
     with pytest.raises(FileError, match="same place"):
         call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *words, *words[:2])
