@@ -28,8 +28,16 @@ FINE = 3
 LAMPS = 20
 """Directions of the lamp that the fit is begun from."""
 STEPS = 40
-WORST_MISFIT = 30.0
-"""Mean square of the residuals beyond which the patch is another body's."""
+WORST_MISFIT = 3.0
+"""Mean square of the residuals beyond which the patch is another body's; 0.2 to 1 where the model holds."""
+RUN = 7
+"""Columns in a row whose residuals are summed: noise has no sign in common, a cut has."""
+WORST_RUN = 4.7
+"""Of such a sum, in sigmas, beyond which something hides a part of the body, or lights it otherwise."""
+MODEL_SHARE = 0.3
+"""Of what the model is said to leave of each column's brightness, that which goes together over columns."""
+WORST_EDGE_RUN = 6.0
+"""The same of the upper and lower edges, whose sigmas hold what the lens bends."""
 SURE = 25.0
 """By so much another place must fit worse, in squared sigmas."""
 OTHER_M = 0.02
@@ -176,6 +184,8 @@ def _solved(camera: SideCamera, body: SideBody, patch: LitPatch) -> Seen | Unsee
         return Unseen(
             f"the lit part is none of {body.vehicle}: its outline misses by {misfit**0.5:.0f} sigmas"
         )
+    if _is_cut(patch, best.fun):
+        return Unseen(f"the lit part is none of {body.vehicle}, or something hides a part of it")
     for other_cost, other in found[1:]:
         if np.hypot(*(other.x[:2] - best.x[:2])) > OTHER_M and other_cost < cost + SURE * max(1.0, misfit):
             return Unseen("two places explain the lit part alike", is_ambiguous=True)
@@ -191,3 +201,25 @@ def _solved(camera: SideCamera, body: SideBody, patch: LitPatch) -> Seen | Unsee
     whole[:2, :2] = turn @ covariance @ turn.T
     whole[2, 2] = math.inf
     return seen_at(place, math.nan, whole, len(patch.edge_columns), misfit)
+
+
+def _is_cut(patch: LitPatch, residuals: Floats) -> bool:
+    """Whether neighbouring columns miss the model alike.
+
+    An outline that ends in a cut instead of at a limb or the terminator does: the fit spreads such a miss so
+    thinly that its mean square tells nothing.
+    """
+    columns, edges = len(patch.columns), len(patch.edge_columns)
+    noise2 = patch.profile_noise**2
+    model2 = np.maximum(patch.profile_sigma**2 - noise2, 0.0)
+    narrow = patch.profile_sigma / np.sqrt(noise2 + MODEL_SHARE**2 * model2)
+    profile = residuals[:columns] * narrow
+    upper, lower = residuals[columns : columns + edges], residuals[columns + edges :]
+    return _longest(profile) > WORST_RUN or max(_longest(upper), _longest(lower)) > WORST_EDGE_RUN
+
+
+def _longest(residuals: Floats) -> float:
+    """The largest sum over `RUN` residuals in a row, in sigmas of such a sum."""
+    count = min(RUN, len(residuals))
+    sums = np.convolve(residuals, np.ones(count), mode="valid") / math.sqrt(count)
+    return float(np.abs(sums).max())

@@ -34,6 +34,8 @@ PLACE_FLOOR_PX = 0.05
 """The same of where a column lies: counts where the brightness is steep."""
 CONTRAST_SIGMAS = 12.0
 """A column's level over its noise from which its edges are used."""
+SPIKE_REACH, SPIKE_SIGMAS, MOST_SPIKES = 2, 5.0, 0.05
+"""A column whose edge lies so far from the median of those around is spoilt, where few are."""
 BLUR_PX = 0.8
 """Of the lens, standard deviation."""
 
@@ -45,7 +47,8 @@ class LitPatch:
     Attributes:
         columns: Of the profile, from some way outside the patch on the left to as far on the right, (n,).
         profile: Mean light over the rows in the middle, above the background, (n,).
-        profile_sigma: Its noise, (n,).
+        profile_sigma: Its noise and what the model leaves, (n,).
+        profile_noise: Its noise alone, (n,).
         edge_columns: Those whose edges are sharp, (k,).
         upper, lower: Rows of the edges, (k,).
         edge_sigma: Of each, (k,).
@@ -54,6 +57,7 @@ class LitPatch:
     columns: Floats
     profile: Floats
     profile_sigma: Floats
+    profile_noise: Floats
     edge_columns: Floats
     upper: Floats
     lower: Floats
@@ -140,15 +144,30 @@ def _measured(picture: Picture, blob: Blob, background: Background) -> LitPatch 
     bent = np.abs(np.gradient(np.gradient(upper))) * 0.5 * BLUR_PX**2
     unsure = np.abs(np.gradient(upper)) * np.abs(moved)
     edge_sigma = np.sqrt(np.square(spread) + EDGE_FLOOR_PX**2 + bent**2 + unsure**2)
+    kept = _without_spikes((upper, lower), edge_sigma)
+    if np.count_nonzero(kept) < LEAST_COLUMNS:
+        return Unseen("the lit part is too faint to be measured")
     return LitPatch(
         columns.astype(float),
         profile,
         sigma,
-        columns[lit] + moved,
-        np.array(upper),
-        np.array(lower),
-        edge_sigma,
+        np.sqrt(noise / count),
+        (columns[lit] + moved)[kept],
+        np.array(upper)[kept],
+        np.array(lower)[kept],
+        edge_sigma[kept],
     )
+
+
+def _without_spikes(edges: tuple[list[float], list[float]], sigma: Floats) -> NDArray[np.bool_]:
+    """Which columns have edges like those beside them: a hot pixel in its window moves one edge alone."""
+    kept = np.ones(len(sigma), dtype=bool)
+    for edge in edges:
+        padded = np.pad(np.array(edge), SPIKE_REACH, mode="reflect")
+        around = np.lib.stride_tricks.sliding_window_view(padded, 2 * SPIKE_REACH + 1)
+        kept &= np.abs(np.array(edge) - np.median(around, axis=1)) < SPIKE_SIGMAS * sigma
+    is_few = np.count_nonzero(~kept) <= max(2, MOST_SPIKES * len(kept))
+    return kept if is_few else np.ones(len(sigma), dtype=bool)
 
 
 def _trimmed_mean(light: Floats) -> Floats:
