@@ -31,13 +31,14 @@ class Status(StrEnum):
 
 
 class Reason(StrEnum):
-    """Why a frame was not solved."""
+    """Why a frame was not solved, or what is wrong with its answer."""
 
     NONE = ""
     TOO_FEW_POINTS = "fewer than four points that span space"
     NO_POINTS = "no points"
     NO_AGREEMENT = "the centres do not agree with any pose"
     SEVERAL_POSES = "several poses fit"
+    CONTRADICTED = "the frames contradict the motion model, the sigma is widened: is the inertia right?"
     TOO_FAST = "the target turns too fast for the frames"
     NO_SOLUTION = "the solver did not come to rest"
 
@@ -50,7 +51,7 @@ class Track:
         frame: Its number.
         t_s: Its time.
         status: What stands behind it.
-        reason: Why it was not solved.
+        reason: Why it was not solved, or what is wrong with the answer all the same.
         pose: Of the body's origin; None where nothing is known.
         covariance: (6, 6), position m and turn rad in camera axes; NaN where nothing is known.
         velocity_m_s: Of the centre of mass in the orbital frame, (3,); NaN where unknown.

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.relative_navigation.innovations import Innovations
 from groundstation.relative_navigation.motion import ACCELERATION, RATE, STATE, VELOCITY, CameraCraft
 from groundstation.relative_navigation.motion_bank import PLACE, SPEED, SPIN, FrameInformation, MotionBank
 from groundstation.relative_navigation.pose import Pose
@@ -91,6 +92,7 @@ class MotionFilter:
         self._levels = np.zeros(3)
         self._unit = np.ones((3, 1))
         self._evidence = np.zeros(MEMBERS)
+        self._innovations = Innovations()
         self._before = t_s, self._bank.copy()
 
     def predict(self, t_s: float) -> None:
@@ -135,6 +137,7 @@ class MotionFilter:
             worse = np.array([s > SURPRISE and not w for s, w in zip(surprises, wide, strict=True)])
             if not worse.any():
                 return
+            self._innovations.forget()
             self._levels = self._levels + worse
             self._evidence = np.zeros(MEMBERS)
             before_s, bank = self._before
@@ -173,6 +176,8 @@ class MotionFilter:
         Returns:
             Log of the likelihood that the middle member gave it, up to a constant.
         """
+        if self.frames > 2:  # before, nothing is foretold
+            self._innovations.note(*self.prior, frame)
         likelihood = self._bank.update(frame)
         self.frames += 1
         if self.frames > 3:  # before, the wide beliefs about rates decide
@@ -193,14 +198,21 @@ class MotionFilter:
 
     @property
     def estimate(self) -> MotionEstimate:
-        """What the middle member believes."""
+        """What the middle member believes; a bias that the frames show is in its covariance."""
         row = self._bank.states[0]
+        covariance = self._bank.covariances[0, :12, :12].copy()
+        covariance[:6, :6] += self._innovations.bias
         return MotionEstimate(
             self._bank.pose(0),
             row[SPEED].copy(),
             row[SPIN].copy(),
-            self._bank.covariances[0, :12, :12].copy(),
+            covariance,
         )
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether the last frames miss their predictions by more than both are said to be wrong."""
+        return self._innovations.are_too_large
 
     @property
     def unmodelled(self) -> tuple[float, float, float]:

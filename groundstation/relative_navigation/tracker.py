@@ -275,6 +275,8 @@ class MotionTracker:
         elif self._is_aliased:
             status, reason = Status.ALIASED, Reason.TOO_FAST
             rate = NOTHING3
+        elif motion.is_contradicted:
+            reason = Reason.CONTRADICTED
         pose, covariance = self._origin(pose, covariance)
         sight = sight_of(frame.centres, matches)
         off = sight.pixels - predicted_pixels(
