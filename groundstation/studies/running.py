@@ -37,6 +37,7 @@ def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress
     """
     check_folder(folder)
     check_held(study, figures, folder)
+    new = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     before = _files_in(folder)
     doing = ["beginning"]
@@ -49,7 +50,18 @@ def reproduce(study: Study, figures: Sequence[FigureRow], folder: Path, progress
         return _reproduced(study, figures, folder, noted)
     except KeyboardInterrupt as stop:
         finished = [name for name, stamp in _files_in(folder).items() if before.get(name) != stamp]
+        if not finished:
+            _remove_empty(new)
         raise StudyInterrupted(_stopped(folder, doing[0], finished)) from stop
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """Take away the folders that were made for nothing, the innermost first."""
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:  # something is in it
+            return
 
 
 def _files_in(folder: Path) -> dict[str, int]:

@@ -295,6 +295,9 @@ def test_ctrl_c_says_what_is_finished_and_what_is_not(groundstation, monkeypatch
     fresh = replace(study, sources={"one": Kept(True), "two": Kept(True)})
     with pytest.raises(StudyInterrupted, match="while flying one: nothing was finished in"):
         reproduce(fresh, fresh.figures, tmp_path / "new", lambda text, done: None)
+    with pytest.raises(StudyInterrupted, match="nothing was finished in"):
+        reproduce(fresh, fresh.figures, tmp_path / "made" / "for_nothing", lambda text, done: None)
+    assert not (tmp_path / "made").exists()
     done = replace(study, sources={"one": Kept(False), "two": Kept(False)})
     reproduce(done, done.figures, tmp_path / "new", lambda text, done: None)
     with pytest.raises(StudyInterrupted, match="those that are there are of an earlier run"):
