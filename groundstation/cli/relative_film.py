@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.cli.annotated_film import annotated_film
 from groundstation.cli.progress import progress_line
 from groundstation.cli.relative_review import Review
 from groundstation.data_sets.relative_film import Film, Shot
+from groundstation.files.film import new_film
 from groundstation.relative_navigation.answers import Track
 from groundstation.relative_navigation.motion_models import Tracker
 from groundstation.relative_navigation.overlay import draw_track
@@ -56,17 +57,20 @@ def track_film(
     rate_hz = film.rate_hz if film.rate_hz > 0.5 else _PREVIEW_HZ
     answers: list[tuple[Track, float]] = []
     troubles: Counter[Trouble] = Counter()
-    with progress_line() as progress, annotated_film(annotated, rate_hz, size) as write:
+    with ExitStack() as stack:
+        progress = stack.enter_context(progress_line())
+        seen_film = None if annotated is None else stack.enter_context(new_film(annotated, rate_hz, size))
         for shot in film.shots():
             begin = time.process_time()
             seen = _seen(shot, finder)
             track = tracker.look(Frame(shot.number, shot.t_s, seen.centres))
             answers.append((track, 1000.0 * (time.process_time() - begin)))
             troubles[seen.trouble] += 1
-            if annotated is not None or (review is not None and review.wants(track)):
+            if seen_film is not None or (review is not None and review.wants(track)):
                 picture = shot.picture if shot.picture is not None else _black(settings)
                 drawn = draw_track(picture, settings.camera, settings.target, track, seen.centres)
-                write(drawn)
+                if seen_film is not None:
+                    seen_film.write(drawn)
                 if review is not None and review.wants(track):
                     review.add(track, drawn)
             progress("tracking", shot.number / film.count if film.count else float("nan"))

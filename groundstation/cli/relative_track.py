@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 import typer
 
-from groundstation.cli.annotated_film import check_annotated
 from groundstation.cli.progress import with_progress
 from groundstation.cli.relative_film import track_film
 from groundstation.cli.relative_review import Review
@@ -23,6 +22,7 @@ from groundstation.data_sets.relative_film import Film
 from groundstation.data_sets.relative_looks import looks_of
 from groundstation.data_sets.relative_pixels import read_pixels
 from groundstation.declarations.errors import UsageError
+from groundstation.files.film import check_film_name
 from groundstation.files.writing import Content, check_targets, write_files
 from groundstation.relative_navigation.answers import Status, Track
 from groundstation.relative_navigation.motion_models import DEFAULT as DEFAULT_MOTION
@@ -93,7 +93,8 @@ def track(
         raise UsageError("--annotated, --review and --rate-hz go with --video.")
     if rate_hz is not None and not LEAST_RATE_HZ <= rate_hz <= MOST_RATE_HZ:
         raise UsageError(f"--rate-hz must be {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}, found {rate_hz:g}.")
-    check_annotated(annotated)
+    if annotated is not None:
+        check_film_name(annotated, "the film of --annotated")
     check_targets(out, annotated, review, rates, sources=[case, target, pixels, video])
     path = case if case is not None else target
     assert path is not None

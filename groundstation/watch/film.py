@@ -3,15 +3,13 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.declarations.errors import UsageError
-from groundstation.files.errors import FileError
-from groundstation.files.film import check_film
+from groundstation.files.film import check_film_name, new_film
 from groundstation.parts.overhead.messages import OverheadImage
 from groundstation.parts.table import installed_tables
 from groundstation.recording.reader import Recording
@@ -20,8 +18,6 @@ from groundstation.watch.table_picture import TablePicture
 
 Progress = Callable[[str, float], None]
 Picture = NDArray[np.uint8]
-CODECS: Final = {".mp4": ("vp09", "mp4v"), ".avi": ("MJPG",)}
-"""By the ending of the file, the best first: browsers show vp09, every OpenCV writes MJPG."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +58,7 @@ def write_film(recording: Path, target: Path, plan: FilmPlan, progress: Progress
         RecordingError: The recording cannot be read.
         FileError: The film cannot be written.
     """
-    if target.suffix.lower() not in CODECS:
-        raise UsageError(f"{target}: a film ends in {', '.join(CODECS)}")
+    check_film_name(target)
     progress("reading the recording", 0.0)
     if plan.is_of_camera:
         times_s, size, picture_at = _of_camera(recording, plan)
@@ -72,20 +67,11 @@ def write_film(recording: Path, target: Path, plan: FilmPlan, progress: Progress
     if not len(times_s):
         end = "its end" if plan.to_s is None else f"{plan.to_s:g} s"
         raise UsageError(f"{recording}: nothing lies between {plan.from_s:g} s and {end}")
-    part = target.with_name(f".part.{target.name}")
-    try:
-        writer, codec = _opened(part, plan.frames_per_s, size)
+    with new_film(target, plan.frames_per_s, size) as film:
         for done, t_s in enumerate(times_s.tolist()):
-            writer.write(picture_at(t_s))
+            film.write(picture_at(t_s))
             progress("filming", done / len(times_s))
-        writer.release()
-        check_film(part, target, len(times_s))
-        part.replace(target)
-    except OSError as error:
-        raise FileError(f"{target}: cannot be written ({error.strerror or error}).") from error
-    finally:
-        part.unlink(missing_ok=True)
-    return len(times_s), codec
+    return film.count, film.codec
 
 
 Shown = tuple[NDArray[np.float64], tuple[int, int], Callable[[float], Picture]]
@@ -142,18 +128,3 @@ def _camera_pictures(path: Path, start_ns: int) -> Iterator[tuple[float, Picture
             else:
                 picture = rows[:, : 3 * image.width].reshape(image.height, image.width, 3)
             yield (image.stamp_ns - start_ns) * 1e-9, np.asarray(picture, np.uint8)
-
-
-def _opened(part: Path, frames_per_s: float, size: tuple[int, int]) -> tuple[cv2.VideoWriter, str]:
-    """A writer with the first codec that works here; OpenCV's complaints about the others are kept quiet."""
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        for codec in CODECS[part.suffix.lower()]:
-            writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*codec), frames_per_s, size)
-            if writer.isOpened():
-                return writer, codec
-            writer.release()
-    finally:
-        cv2.utils.logging.setLogLevel(level)
-    raise UsageError(f"OpenCV here writes no {part.suffix} film: try {' or '.join(CODECS)}")

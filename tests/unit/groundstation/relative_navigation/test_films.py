@@ -232,7 +232,7 @@ def test_options_that_do_not_go_together_are_refused(call, film, tmp_path):
         ((case, "--pixels", "b", "--out", out, "--review", tmp_path / "r.html"), "go with --video"),
         (
             (case, "--video", folder / "film.avi", "--out", out, "--annotated", tmp_path / "a.gif"),
-            "must end in",
+            "of --annotated ends in",
         ),
         (("--video", folder / "film.avi", "--out", out), "one case"),
         ((case, "--video", folder / "film.avi", "--out", out, "--rate-hz", "1e-300"), "0.001 to 10000"),

@@ -62,7 +62,7 @@ def test_a_film_has_a_picture_for_each_moment(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--out", "a.gif"], "a film ends in .mp4, .avi"),
+        (["--out", "a.gif"], "a film ends in .mp4 or .avi"),
         (["--out", "a.mp4", "--from-s", "50"], "nothing lies between"),
         (["--out", "a.mp4", "--camera"], "holds no pictures of the camera over the table"),
         (["--out", "no/such/a.mp4"], "there is no folder"),
