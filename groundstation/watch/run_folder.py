@@ -12,8 +12,8 @@ report.json           numbers and verdict, as `groundstation report` writes them
 import json
 import platform
 import re
-import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -52,6 +52,7 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.recording = path / FIRST_NAME
+        self._written: list[Path] = []
 
     def begin(self, rig: Rig, rig_text: str, scenario_text: str | None = None) -> None:
         """Write all that is known before anything moves.
@@ -72,12 +73,12 @@ class RunFolder:
             raise FileError(
                 f"{self.path}: no such folder can be made ({error.strerror or error})."
             ) from error
-        write_file(self.path / RIG, rig_text)
+        self._write(RIG, rig_text)
         if scenario_text is not None:
-            write_file(self.path / SCENARIO, scenario_text)
+            self._write(SCENARIO, scenario_text)
         for key, file in files.items():
-            write_file(self.path / FILES / f"{key}{file.path.suffix}", file.data)
-        write_file(self.path / RUN, _as_text(_run(rig, {key: file.sha256 for key, file in files.items()})))
+            self._write(f"{FILES}/{key}{file.path.suffix}", file.data)
+        self._write(RUN, _as_text(_run(rig, {key: file.sha256 for key, file in files.items()})))
         if not files:
             (self.path / FILES).rmdir()
 
@@ -109,12 +110,22 @@ class RunFolder:
         return missing
 
     def discard_if_nothing_was_recorded(self) -> bool:
-        """Leave no folder without a recording; whether it is gone."""
+        """Leave no folder without a recording; whether it is gone. What somebody else has put there stays."""
         finished, torn = run_of(self.recording)
         if finished or torn:
             return False
-        shutil.rmtree(self.path, ignore_errors=True)
-        return True
+        for path in self._written:
+            with suppress(OSError):
+                path.unlink()
+        for folder in (self.path / FILES, self.path):
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+        return not self.path.exists()
+
+    def _write(self, name: str, content: str | bytes) -> None:
+        """Write one of its files."""
+        self._written.append(self.path / name)
+        write_file(self.path / name, content)
 
 
 def new_run_folder(directory: Path, stamp: str, name: str) -> RunFolder:

@@ -11,6 +11,7 @@ from groundstation.recording.info import RecordingInfo
 from groundstation.recording.reader import Recording
 from groundstation.recording.run_files import next_name, part_of, run_of
 from groundstation.recording.writer import Recorder
+from groundstation.rig.read import load_rig
 from groundstation.watch.run_folder import new_run_folder
 
 ROOT = Path(__file__).parents[4]
@@ -90,6 +91,17 @@ def test_a_run_that_is_refused_leaves_no_folder(tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     folder = tmp_path / "recordings"
     assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_what_somebody_put_into_the_folder_stays_though_nothing_was_recorded(tmp_path):
+    folder = new_run_folder(tmp_path, "2026-03-01_12-00-00", "stay")
+    folder.begin(load_rig(RIG), RIG.read_text(), SCENARIO)
+    (folder.path / "lamp.txt").write_text("the third lamp flickers")
+    assert not folder.discard_if_nothing_was_recorded()
+    assert [path.name for path in folder.path.iterdir()] == ["lamp.txt"]
+    (folder.path / "lamp.txt").unlink()
+    assert folder.discard_if_nothing_was_recorded()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_name_that_is_taken_gets_a_number(tmp_path):
