@@ -46,6 +46,8 @@ MOST_REOPENINGS = 12
 WIDEST_TURN_RAD, WIDEST_SHARE = 2.0 * math.pi, 10.0
 """A prediction with such a sigma, of its turn or as a share of its distance, says nothing: to believe the
 motion still less would only cost the digits of what is known."""
+LEAST_MADE = 1e-12
+"""Least over largest eigenvalue of a covariance that was made positive."""
 LEAST_SCALED = 1e-13
 """Least eigenvalue of a pose covariance scaled to ones on its diagonal; below, rounding has eaten it."""
 
@@ -106,6 +108,24 @@ class MotionFilter:
         densities = np.power(STEP, self._levels + _OFFSETS) * self._unit[:, 0]
         self._bank.predict(self._craft, self._inertia, self.t_s, t_s, densities)
         self.t_s = t_s
+        if not self.is_sound():
+            self._make_positive()
+
+    def _make_positive(self) -> None:
+        """Take what rounding has made negative for as much variance: no less is unknown than was lost.
+
+        A long way between frames carries a wide belief of velocity into the place, where it cancels.
+        """
+        covariances = self._bank.covariances
+        if not np.isfinite(covariances).all():
+            return
+        size = np.sqrt(np.abs(covariances[:, range(STATE), range(STATE)]))
+        size[size == 0.0] = 1.0
+        scale = size[:, :, None] * size[:, None, :]
+        scaled = covariances / scale
+        values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.transpose(0, 2, 1)))
+        values = np.maximum(np.abs(values), LEAST_MADE * values[:, -1:])
+        covariances[:] = scale * ((vectors * values[:, None, :]) @ vectors.transpose(0, 2, 1))
 
     def reopen(self, pose: Pose) -> None:
         """Believe the models less until the last prediction could have led to a pose that a frame showed.

@@ -4,8 +4,7 @@ Ivanov, Karpenko, Ovchinnikov 2012 (Chibis-M), section 2.2; Simakov, Ustyugov 20
 last frame is carried on to the next; in a neighbourhood of each predicted point the nearest centre is taken;
 the solver begins at the prediction, and its answer is the next state. A frame with fewer than four points
 that span space corrects nothing: the prediction is the answer and is carried on, errors and all. What the
-publication does not say: one centre serves one point only, rates before the second frame are zero, and a pose
-that misses its centres by far more than their noise is none.
+publication does not say: one centre serves one point only, and rates before the second frame are zero.
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ from groundstation.relative_navigation.tracker_settings import Frame, TrackerSet
 
 Floats = NDArray[np.float64]
 
-MOST_COST = 16.0
-"""Sum of squares for each centre, in sigmas, beyond which strays were taken for points."""
 REACH_PX = 12.0
 """The published neighbourhood epsilon where the case gives none; no value is published: assumed."""
 
@@ -76,11 +73,9 @@ class PublishedFrames:
             points = self._settings.target.points_from_mass_m
             sight = sight_of(frame.centres, matches)
             fit = self._solver(self._settings.camera, points, sight, ahead.pose, None)
-        if fit is None or not fit.converged or fit.cost > MOST_COST * len(matches):
+        if fit is None or not fit.converged:
             self._state = ahead
             reason = Reason.TOO_FEW_POINTS if fit is None else Reason.NO_SOLUTION
-            if fit is not None and fit.converged:
-                reason = Reason.NO_AGREEMENT
             return self._track(
                 frame, ahead, Status.PROPAGATED, Reason.NO_POINTS if not len(frame.centres) else reason
             )
