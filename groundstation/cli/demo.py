@@ -48,10 +48,10 @@ def data(
         try:
             with whole_folder(folder / kind.name) as made:
                 kind.make(made, seed)
-        except OSError as error:
+        except FileError:
             with suppress(OSError):  # it stays where it holds something
                 folder.rmdir()
-            raise FileError(f"{folder / kind.name}: cannot be written ({error.strerror}).") from error
+            raise
     for kind in wanted:
         print(f"{kind.name}: {kind.summary}")
         for words in kind.commands:

@@ -235,7 +235,7 @@ def test_options_that_do_not_go_together_are_refused(call, film, tmp_path):
             "of --annotated ends in",
         ),
         (("--video", folder / "film.avi", "--out", out), "one case"),
-        ((case, "--video", folder / "film.avi", "--out", out, "--rate-hz", "1e-300"), "0.001 to 10000"),
+        ((case, "--video", folder / "film.avi", "--out", out, "--rate-hz", "1e-6"), "0.001 to 10000"),
         ((case, "--video", folder / "film.avi"), "--out"),
     ):
         with pytest.raises(UsageError, match=sentence):
@@ -299,7 +299,7 @@ def test_a_target_file_is_made_from_clicks_and_lengths(call, film, tmp_path):
         with pytest.raises(UsageError, match=sentence):
             call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *bad)
     for diameter in ("0", "-1", "1e308", "nan"):
-        with pytest.raises(UsageError, match="--tip-diameter-m must be above 0 and at most 10"):
+        with pytest.raises(UsageError, match=r"^--tip-diameter-m (is|must be)"):
             call("target", picture, "--out", tmp_path / "t.toml", "--f-px", "750", *words,
                  "--tip-diameter-m", diameter)  # fmt: skip
     one_pixel = [
