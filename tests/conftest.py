@@ -1,5 +1,6 @@
 """What holds for all tests: hypothesis draws the same examples everywhere and measures no time."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -53,5 +54,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # by a shell without job control
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if chosen := config.getoption("--core-folder"):
         library.built_folder = lambda: Path(chosen)
