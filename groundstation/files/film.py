@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 from groundstation.files.foreign_lines import ForeignLines
 
@@ -59,10 +58,10 @@ def check_film_name(path: Path, what: str = "a film") -> None:
     """Refuse a name that no film of ours has.
 
     Raises:
-        UsageError: The ending is none of `CODECS`.
+        FileError: The ending is none of `CODECS`.
     """
     if path.suffix.lower() not in CODECS:
-        raise UsageError(f"{what} ends in {' or '.join(CODECS)}, found {path.name!r}.")
+        raise FileError(f"{what} ends in {' or '.join(CODECS)}, found {path.name!r}.")
 
 
 @contextmanager
@@ -75,8 +74,7 @@ def new_film(path: Path, rate_hz: float, size: tuple[int, int]) -> Iterator[Film
         size: Width and height, px.
 
     Raises:
-        UsageError: OpenCV has no codec here for such a file.
-        FileError: It cannot be written; what was there stays.
+        FileError: It cannot be written, or OpenCV has no codec here for such a file; what was there stays.
     """
     try:
         made = tempfile.TemporaryDirectory(dir=path.parent, prefix=".part.")
@@ -112,7 +110,7 @@ def _opened(part: Path, rate_hz: float, size: tuple[int, int]) -> tuple[cv2.Vide
         if writer.isOpened():
             return writer, codec
         writer.release()
-    raise UsageError(f"OpenCV here writes no {part.suffix} film: try {' or '.join(CODECS)}")
+    raise FileError(f"OpenCV here writes no {part.suffix} film: try {' or '.join(CODECS)}")
 
 
 def _pictures_in(path: Path) -> int:

@@ -54,9 +54,9 @@ def write_film(recording: Path, target: Path, plan: FilmPlan, progress: Progress
         How many pictures it has, and its codec.
 
     Raises:
-        UsageError: There is nothing to film, or no codec for such a file.
+        UsageError: There is nothing to film.
         RecordingError: The recording cannot be read.
-        FileError: The film cannot be written.
+        FileError: The film cannot be written, or there is no codec for such a file.
     """
     check_film_name(target)
     progress("reading the recording", 0.0)

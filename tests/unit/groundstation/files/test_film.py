@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 from groundstation.files.film import check_film_name, new_film
 
@@ -61,5 +60,5 @@ def test_what_fails_while_it_is_made_leaves_nothing(tmp_path):
 def test_a_folder_that_is_not_there_and_an_ending_that_no_film_has_are_named(tmp_path):
     with pytest.raises(FileError, match=r"gone/film\.avi: cannot be written \(No such file"):
         write(tmp_path / "gone" / "film.avi", 1)
-    with pytest.raises(UsageError, match=r"of --annotated ends in \.mp4 or \.avi, found .film\.gif"):
+    with pytest.raises(FileError, match=r"of --annotated ends in \.mp4 or \.avi, found .film\.gif"):
         check_film_name(tmp_path / "film.gif", "the film of --annotated")
