@@ -44,6 +44,7 @@ def read_frames(path: Path) -> NDArray[np.uint8]:
 
 
 _SPOILT = (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+"""What NumPy and zipfile raise on data that are spoilt; the last where a compression is unknown to them."""
 
 
 def _frames(data: bytes, path: Path) -> NDArray[np.generic]:
