@@ -31,7 +31,7 @@ def contents(folder):
     return {
         path.relative_to(folder): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in folder.rglob("*")
-        if path.is_file()
+        if path.is_file() and path.parent.name != "__pycache__"  # Python's own, which git ignores
     }
 
 
