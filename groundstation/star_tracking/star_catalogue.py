@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from groundstation.files.errors import FileError
 from groundstation.files.number_tables import parse_table
@@ -66,6 +65,8 @@ class StarCatalogue:
         Raises:
             ValueError: It is one.
         """
+        from scipy.spatial import cKDTree  # every process reads rigs, and few look for neighbours
+
         half = 0.5 * np.array([camera.width / camera.fx, camera.height / camera.fy])
         reach_m = 2.0 * float(np.hypot(*half)) * camera.ceiling_height_above_camera_m
         place_m = np.stack((self.x_m, self.y_m), axis=1)
