@@ -38,6 +38,7 @@ from bench import (  # noqa: E402
     live_faults,
     lockstep_speed,
     many_mock_ups,
+    memory,
     outage,
     overhead,
     parser,
@@ -82,6 +83,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "hostile_commands": hostile_commands.measure,
         "flying_formation": flying_formation.measure,
         "house": house.measure,
+        "memory": memory.measure,
         "station_keeping": station_keeping.measure,
         "lockstep": lockstep_speed.measure,
         "parser": parser.measure,
@@ -123,6 +125,7 @@ ON_REQUEST = frozenset(
         "flying_formation",
         "laboratory_fit",
         "live_faults",
+        "memory",
         "deaths",
         *FOLDERS,
     }

@@ -14,37 +14,26 @@ vehicles fly; memory (PSS: shared pages count in parts) is read at the end of th
 
 import argparse
 import os
-import queue
 import statistics
-import subprocess
 import sys
-import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run as a file of its own
-from bench.processes import children, read
+from bench.flown_rig import EMULATOR, GROUPS, LAUNCHER, HouseError, flown, pss_mb
+from bench.processes import read
 from bench.rows import ROOT, Bench, Row
 
 RIG = Path("examples/rigs/two_mock_ups.toml")
-READY = "all processes are ready"
-READY_WITHIN_S, ENDED_WITHIN_S = 60.0, 20.0
-STATION, EMULATOR = "station, all", "emulator"
-LAUNCHER, FORK_SERVER = "launcher", "fork server"
-GROUPS = (LAUNCHER, FORK_SERVER, "recorder", "commands", "flights", "skies", "station", "others")
+STATION = "station, all"
 SECONDS, SETTLE_S, RUNS = 20.0, 12.0, 3
 LIMITS = {"ready, s": 4.0, f"CPU, cores: {LAUNCHER}": 0.08}
 """Of figures, on the machine of docs/benchmarks.md."""
 RATIO_LIMITS = {f"CPU, cores: {STATION}": 0.5, f"PSS, MB: {STATION}": 0.5}
 """Of figures to those of the checkout before."""
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
-
-
-class HouseError(Exception):
-    """A run did not become ready, lost a process or did not end well; the text says what it printed last."""
 
 
 @dataclass(frozen=True)
@@ -76,126 +65,19 @@ def run_once(checkout: Path, rig: Path, seconds: float, settle_s: float) -> Cost
     Raises:
         HouseError: The run was none to measure.
     """
-    with tempfile.TemporaryDirectory(prefix="house_") as folder:
-        command = [str(checkout / ".venv" / "bin" / "groundstation"), "run", str(checkout / rig)]
-        command += ["--headless", "--record", f"{folder}/run.mcap"]
-        if (checkout / "groundstation" / "console").is_dir():
-            command.append("--no-console")  # earlier commits have none; its own subject measures it
-        begin_s = time.monotonic()
-        process = subprocess.Popen(
-            command,
-            cwd=checkout,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=_environment(checkout),
-        )
-        lines = _Lines(process)
-        try:
-            ready_s = lines.wait_for(READY, READY_WITHIN_S) - begin_s
-            first = _groups(process.pid)
-            total_cpu_s = sum(_cpu_s(first[name]) for name in GROUPS if name in first)
-            time.sleep(settle_s)  # the vehicles rest, then fly: the window looks at flying ones
-            groups = _groups(process.pid)
-            from_s, cpu_from_s = time.monotonic(), {name: _cpu_s(pids) for name, pids in groups.items()}
-            time.sleep(seconds)
-            cpu_s = {name: _cpu_s(pids) - cpu_from_s[name] for name, pids in groups.items()}
-            took_s = time.monotonic() - from_s
-            pss_mb = {name: sum(map(_pss_mb, pids)) for name, pids in groups.items()}
-            if _groups(process.pid) != groups:
-                raise HouseError(f"{checkout}: a process died or was restarted\n{lines.newest()}")
-        finally:
-            process.terminate()
-            try:
-                code = process.wait(ENDED_WITHIN_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                code = process.wait()
-            lines.close()
-    if code:
-        raise HouseError(f"{checkout}: the run ended with code {code}\n{lines.newest()}")
-    return Cost(ready_s, {name: used / took_s for name, used in cpu_s.items()}, pss_mb, total_cpu_s)
-
-
-def _environment(checkout: Path) -> dict[str, str]:
-    """Ours, without what would make one checkout import another."""
-    dropped = {"PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME"}
-    kept = {name: value for name, value in os.environ.items() if name not in dropped}
-    # an editable install leads back to the folder that it was made in, which need not be this one
-    return kept | {"PYTHONPATH": str(checkout)}
-
-
-class _Lines:
-    """What a process prints, read by a thread so that its pipe never fills."""
-
-    def __init__(self, process: "subprocess.Popen[str]") -> None:
-        self._process = process
-        self._all: list[str] = []
-        self._news: queue.SimpleQueue[tuple[float, str] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._all.append(line.rstrip())
-            self._news.put((time.monotonic(), line))
-        self._news.put(None)
-
-    def wait_for(self, text: str, within_s: float) -> float:
-        """Moment at which a line with the text came, on the monotonic clock."""
-        until_s = time.monotonic() + within_s
-        while (left_s := until_s - time.monotonic()) > 0:
-            try:
-                news = self._news.get(timeout=left_s)
-            except queue.Empty:
-                break
-            if news is None:
-                raise HouseError(f"the run ended by itself\n{self.newest()}")
-            if text in news[1]:
-                return news[0]
-        raise HouseError(f"no line '{text}' within {within_s:g} s\n{self.newest()}")
-
-    def newest(self) -> str:
-        """The last lines, for people."""
-        return "\n".join(f"  {line}" for line in self._all[-12:])
-
-    def close(self) -> None:
-        """Let the thread end."""
-        self._thread.join(2.0)
-        if self._process.stdout is not None and not self._thread.is_alive():
-            self._process.stdout.close()
-
-
-def _groups(launcher: int) -> dict[str, tuple[int, ...]]:
-    """Process numbers by group; a child of the emulator is the emulator's."""
-    found: dict[str, list[int]] = {LAUNCHER: [launcher]}
-
-    def visit(pid: int, group: str | None) -> None:
-        for child in children(pid):
-            named = group or _group_of(child)
-            found.setdefault(named, []).append(child)
-            visit(child, EMULATOR if named == EMULATOR else None)
-
-    visit(launcher, None)
-    return {name: tuple(sorted(pids)) for name, pids in sorted(found.items())}
-
-
-def _group_of(pid: int) -> str:
-    """By the name that a process gave itself, or the last word of its command line."""
-    words = read(pid, "cmdline").split("\0")
-    if "firmware_emulator" in words:
-        return EMULATOR
-    for name in (read(pid, "comm").strip(), *reversed([word for word in words if word])):
-        if name.endswith("_flight"):
-            return "flights"
-        if name.endswith("_sky"):
-            return "skies"
-        if name in GROUPS:
-            return name
-        if "fork" in name:
-            return FORK_SERVER
-    return "others"
+    with flown(checkout, rig) as run:
+        first = run.groups()
+        total_cpu_s = sum(_cpu_s(first[name]) for name in GROUPS if name in first)
+        time.sleep(settle_s)  # the vehicles rest, then fly: the window looks at flying ones
+        groups = run.groups()
+        from_s, cpu_from_s = time.monotonic(), {name: _cpu_s(pids) for name, pids in groups.items()}
+        time.sleep(seconds)
+        cpu_s = {name: _cpu_s(pids) - cpu_from_s[name] for name, pids in groups.items()}
+        took_s = time.monotonic() - from_s
+        memory_mb = {name: sum(map(pss_mb, pids)) for name, pids in groups.items()}
+        run.check_still(groups)
+    cpu_cores = {name: used / took_s for name, used in cpu_s.items()}
+    return Cost(run.ready_s, cpu_cores, memory_mb, total_cpu_s)
 
 
 def _cpu_s(pids: Iterable[int]) -> float:
@@ -205,13 +87,6 @@ def _cpu_s(pids: Iterable[int]) -> float:
         fields = read(pid, "stat").rpartition(")")[2].split()
         total += sum(map(int, fields[11:13]))  # utime, stime
     return total * _TICK_S
-
-
-def _pss_mb(pid: int) -> float:
-    for line in read(pid, "smaps_rollup").splitlines():
-        if line.startswith("Pss:"):
-            return int(line.split()[1]) / 1024
-    return 0.0
 
 
 def _medians(costs: list[Cost]) -> dict[str, float]:
