@@ -31,6 +31,9 @@ def export(
     vehicle: Annotated[
         str | None, typer.Option(help="For --fusion-folder, of a recording with several vehicles.")
     ] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="For --fusion-folder, in place of the rig that the recording holds.")
+    ] = None,
 ) -> None:
     """Write the topics of a recording as tables, or a flight as a data set that can be estimated again.
 
@@ -52,9 +55,11 @@ def export(
         raise UsageError(
             "--vehicle goes with --fusion-folder; tables are chosen by --topic, e.g. alpha/state"
         )
+    if rig is not None and fusion_folder is None:
+        raise UsageError("--rig goes with --fusion-folder: tables are as they were recorded")
     try:
         if fusion_folder is not None:
-            _export_flight(file, fusion_folder, vehicle)
+            _export_flight(file, fusion_folder, vehicle, rig)
         elif csv is not None:
             _export_tables(file, csv, topic, "csv")
         elif parquet is not None:
@@ -64,8 +69,8 @@ def export(
         raise UsageError(str(error)) from error
 
 
-def _export_flight(file: Path, fusion_folder: Path, vehicle: str | None) -> None:
-    with opened(file) as (recording, rig):
+def _export_flight(file: Path, fusion_folder: Path, vehicle: str | None, rig_path: Path | None) -> None:
+    with opened(file, rig_path) as (recording, rig):
         chosen = one_of(file, tuple(rig.vehicles), vehicle, "there are")
         data = recorded_flight(file, recording, rig, chosen).tidied()
         more, name = known_of_rig(rig, chosen), f"{chosen} of {file.name}"

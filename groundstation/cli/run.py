@@ -175,7 +175,7 @@ def run(
     elif seed is not None:
         raise UsageError("--seed goes with --lockstep; live, the rig's [laboratory] table holds the seed")
     else:
-        check_ports(hub_port, joined)
+        check_ports(hub_port, joined, port)
     trouble, lines = "", []
     with kept_in(record, loaded, text, loaded.name or file.stem) as (recording, folder):
         firsts = [recording]

@@ -63,12 +63,13 @@ def beside_of(
     return Beside(tuple(bridges), None if guests is None else _guests(guests, certificates))
 
 
-def check_ports(hub_port: int, guests: Guests | None) -> None:
-    """Refuse ports of the hub that cannot be listened on, or are one and the same.
+def check_ports(hub_port: int, guests: Guests | None, foxglove_port: int | None) -> None:
+    """Refuse ports that cannot be listened on, or of which two are one and the same.
 
     Args:
         hub_port: On loopback; 0 for a free one.
         guests: Where other hosts connect; None: nowhere.
+        foxglove_port: Where Foxglove is served; None: not at all.
 
     Raises:
         UsageError: It names the option.
@@ -78,6 +79,8 @@ def check_ports(hub_port: int, guests: Guests | None) -> None:
             held.enter_context(listening(LOOPBACK, hub_port, "--hub-port"))
         if guests is not None:
             held.enter_context(listening(guests.address, guests.port, "--guests"))
+        if foxglove_port:
+            held.enter_context(listening(foxglove.HOST, foxglove_port, "--foxglove-port"))
 
 
 def _is_router(asked: str) -> bool:

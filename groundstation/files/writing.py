@@ -135,7 +135,7 @@ def write_file(path: Path, content: Content) -> None:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder whose files come to ``path`` when all has gone well, and nowhere otherwise.
 
-    Files that are there already stay, unless they have the name of a new one.
+    Files that are there already stay unless a new one has their name. Without files no folder is made.
 
     Raises:
         FileError: The folder cannot be made, a file is in its place, or the disk takes no more.
@@ -150,8 +150,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     with made as unfinished:
         try:
             yield Path(unfinished)
-            path.mkdir(exist_ok=True)
             for file in sorted(Path(unfinished).iterdir()):
+                path.mkdir(exist_ok=True)
                 file.replace(path / file.name)
         except FileError as error:  # it names the folder that was asked for
             if unfinished not in str(error):

@@ -199,6 +199,7 @@ def _read_authority(folder: Path) -> _Authority:
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
     """Write all or nothing; nobody else may read them, and nothing is overwritten."""
+    is_made_here = not folder.exists()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
@@ -214,6 +215,8 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> list[Path]:
     except OSError as error:
         for path in written:
             path.unlink(missing_ok=True)
+        if is_made_here:
+            folder.rmdir()
         if isinstance(error, FileExistsError):
             raise UsageError(
                 f"{error.filename} is there already: certificates are not overwritten, name another folder"

@@ -98,8 +98,12 @@ def test_a_hub_or_guests_that_cannot_be_listened_for_are_refused(
         assert "is no address of this machine" in sentence(*guests, strange)
 
 
-def test_a_port_that_two_options_name_is_refused(certificates, tmp_path, groundstation):
+def test_a_port_that_two_options_name_is_refused(monkeypatch, certificates, tmp_path, groundstation):
     free = check_listening("127.0.0.1", 0, "")
+    monkeypatch.setattr(foxglove, "find_spec", lambda _name: object())
+    words = ("--hub-port", free, "--foxglove", "--foxglove-port", free)
+    sentence = refused_before_anything_starts(groundstation, tmp_path, *words)
+    assert sentence == f"port {free} of 127.0.0.1 is taken: choose another with --foxglove-port"
     words = ("--hub-port", free, "--guests", f"127.0.0.1:{free}", "--guests-certificates", certificates)
     sentence = refused_before_anything_starts(groundstation, tmp_path, *words)
     assert sentence == f"port {free} of 127.0.0.1 is taken: choose another with --guests"

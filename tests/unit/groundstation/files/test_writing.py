@@ -95,6 +95,9 @@ def test_a_folder_comes_whole_or_not_at_all(tmp_path):
     with pytest.raises(FileError), whole_folder(tmp_path / "out") as folder:
         (folder / "one" / "two").write_text("1")
     assert not list(tmp_path.iterdir())
+    with whole_folder(tmp_path / "out"):
+        assert [path.name.startswith(".part.") for path in tmp_path.iterdir()] == [True]
+    assert not list(tmp_path.iterdir())  # nothing was written: no folder
     with whole_folder(tmp_path / "out") as folder:
         (folder / "one").write_text("1")
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["one"]

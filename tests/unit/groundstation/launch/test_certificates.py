@@ -1,6 +1,8 @@
 """Certificates: what OpenSSL says of them, who may read them, and that nothing is overwritten."""
 
 import datetime
+import errno
+import os
 import ssl
 import stat
 
@@ -9,6 +11,7 @@ from cryptography import x509
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
 from groundstation.declarations.errors import UsageError
+from groundstation.launch import certificates
 from groundstation.launch.certificates import make_all, make_client
 from groundstation.launch.guests import OPERATOR
 
@@ -94,6 +97,21 @@ def test_nothing_is_overwritten_and_nothing_is_left_half(folder):
     with pytest.raises(UsageError, match=r"operator\.key is there already"):
         make_all(folder, (), NOW)
     assert [path.name for path in folder.iterdir()] == ["operator.key"]
+
+
+def test_a_full_disk_leaves_no_folder_that_was_not_there(monkeypatch, tmp_path):
+    written = iter((0, 0, errno.ENOSPC))
+
+    def opened(*arguments):
+        if code := next(written):
+            raise OSError(code, os.strerror(code))
+        return os_open(*arguments)
+
+    os_open = os.open
+    monkeypatch.setattr(certificates.os, "open", opened)
+    with pytest.raises(UsageError, match="new: No space left on device"):
+        make_all(tmp_path / "new", (), NOW)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("host", ["", "a b", "lab/pc", "x" * 300, "-lab", "lab..pc"])

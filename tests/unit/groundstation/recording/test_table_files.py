@@ -67,6 +67,7 @@ def test_a_parquet_file_holds_the_same(tmp_path):
         (["--csv", "a", "--parquet", "b"], "give one of --csv, --parquet and --fusion-folder"),
         (["--csv", "a", "--topic", "alpha/stat"], "did you mean alpha/state"),
         (["--csv", "a", "--vehicle", "alpha"], "--vehicle goes with --fusion-folder"),
+        (["--csv", "a", "--rig", "rig.toml"], "--rig goes with --fusion-folder"),
         (["--fusion-folder", "a", "--topic", "alpha/imu"], "--topic goes with --csv or --parquet"),
     ],
 )
