@@ -48,11 +48,14 @@ class _Stream:
     Attributes:
         is_latched: Whether late joiners receive its last message again.
         channel: Of the file; None where the policy drops it.
-        recent: Moments and numbers of the newest messages.
+        newest: Moment and number of the newest message, which need not have come last: who testifies for a
+            process that died has not received all that it published.
+        recent: Of the messages that came last.
     """
 
     is_latched: bool
     channel: int | None
+    newest: tuple[int, int] = (-1, -1)
     recent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=MOST_RECENT))
 
 
@@ -201,13 +204,16 @@ class Recorder:
                     continue
                 stream = streams[noun, owner] = _Stream(kind.TOPIC.latched, self._channel(kind, owner))
             place = publish_ns, sequence
-            recent = stream.recent
-            if recent and place <= recent[-1] and place in recent:
+            is_newest = place > stream.newest
+            if is_newest:
+                stream.newest = place
+            elif place in stream.recent:
                 continue
-            recent.append(place)
+            stream.recent.append(place)
             log_ns = publish_ns
             if stream.is_latched:
-                self.latched[noun, owner] = message
+                if is_newest:
+                    self.latched[noun, owner] = message
                 log_ns = max(publish_ns, self._begins_ns)
             if stream.channel is not None:
                 add(stream.channel, sequence, publish_ns, message.data, log_ns)

@@ -1,9 +1,13 @@
 """What is recorded comes back, in order and bit for bit; equal runs give equal files."""
 
 import itertools
+import tempfile
 from collections import Counter
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
@@ -294,6 +298,41 @@ def test_what_a_witness_records_again_is_written_once_and_what_only_it_has_is_ke
     with Recording(tmp_path / "a.mcap") as recording:
         found = [message.envelope.publish_ns for message in recording.messages([Wrench])]
     assert found == [5, 10, 15, 20, 25, 40]
+
+
+@given(
+    st.lists(st.sets(st.integers(1, 40), min_size=1).map(sorted), max_size=6),
+    st.integers(1, 40),
+    st.randoms(),
+)
+def test_in_whatever_order_witnesses_come_each_message_is_written_once(testimonies, length, order):
+    demand = Wrench(5, "alpha", *[0.0] * 6)
+    sent = [Delivered(Envelope(Wrench.TOPIC, "alpha", number, 5 * number), demand) for number in range(1, 41)]
+    batches = [sent[begin : begin + length] for begin in range(0, 40, length)]
+    for numbers in testimonies:  # a witness that takes a topic paced has not seen every message
+        batches.insert(order.randint(0, len(batches)), [sent[number - 1] for number in numbers])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "a.mcap")
+        with Recorder(path, EVERYTHING) as recorder:
+            for batch in batches:
+                assert recorder.record_batch(batch_of(batch), PAYLOADS) == 0
+        with Recording(path) as recording:
+            found = [message.envelope.sequence for message in recording.messages([Wrench])]
+    assert found == list(range(1, 41))
+
+
+def test_an_older_latched_message_that_comes_later_is_not_the_newest(tmp_path):
+    first, second = (
+        Delivered(
+            Envelope(CalibrationInUse.TOPIC, "alpha", number, 5 * number),
+            CalibrationInUse(5 * number, "alpha", "imu", "", ""),
+        )
+        for number in (1, 2)
+    )
+    with Recorder(tmp_path / "a.mcap", EVERYTHING) as recorder:
+        for message in (second, first):
+            recorder.record_batch(batch_of([message]), PAYLOADS)
+        assert [message.sequence for message in recorder.latched.values()] == [2]
 
 
 def test_messages_of_unknown_topics_in_a_batch_are_counted_and_not_written(tmp_path, flight):
