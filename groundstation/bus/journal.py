@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.bus.cdr import CodecError
 from groundstation.declarations.message import PACKAGE, Bytes, Message, Text, TextSequence
 from groundstation.declarations.topic import Scope, Topic
 
@@ -25,6 +26,9 @@ class Journal(Message):
         process: Its name.
         names: What the entries point into.
         entries: Packed, see ``ENTRY``.
+
+    Raises:
+        CodecError: The entries are cut off, or point to names that are not there.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Journal"
@@ -32,6 +36,17 @@ class Journal(Message):
     process: Text
     names: TextSequence
     entries: Bytes
+
+    def __post_init__(self) -> None:
+        if len(self.entries) % ENTRY.itemsize:
+            raise CodecError(f"Journal: {len(self.entries)} bytes are no whole entries")
+        packed = packed_entries(self)
+        nodes = packed["node"][packed["node"] != NO_NODE]
+        for index in (nodes, packed["noun"], packed["owner"]):
+            if len(index) and int(index.max()) >= len(self.names):
+                raise CodecError(f"Journal: an entry points to name {int(index.max())} of {len(self.names)}")
+        if len(packed) and int(packed["kind"].max()) > max(Kind):
+            raise CodecError(f"Journal: an entry of kind {int(packed['kind'].max())}, which there is not")
 
 
 class Kind(IntEnum):

@@ -12,11 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from groundstation.bus.cdr import CodecError
 from groundstation.bus.envelope import Delivered, Envelope
 from groundstation.declarations.message import Message
 from groundstation.declarations.topic import Topic
-from groundstation.recording.errors import RecordingError
 from groundstation.recording.gaps import Gap
 from groundstation.recording.recording_file import KnownChannel, RecordingFile
 from groundstation.recording.records import MESSAGE, RECORD
@@ -46,7 +44,7 @@ class Recorded(NamedTuple):
 
     @property
     def payload(self) -> Message:
-        """The payload, decoded anew at each call; CodecError if the bytes are no such payload."""
+        """The payload, decoded anew at each call; RecordingError if the bytes are no such payload."""
         return self.decode(self.data)
 
 
@@ -218,10 +216,7 @@ class Recording:
             RecordingError: A payload or a chunk of the file is damaged.
         """
         for message in self.messages(kinds, owners):
-            try:
-                yield Delivered(message.envelope, message.payload)
-            except CodecError as error:
-                raise RecordingError(f"{self.path}: {error}") from error
+            yield Delivered(message.envelope, message.payload)
 
     def spans(
         self, kinds: Collection[type[Message]], owners: Collection[str] | None = None

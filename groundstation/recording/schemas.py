@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import fields, make_dataclass
 from typing import Annotated, Any
 
-from groundstation.bus.cdr import Codec, codec_of
+from groundstation.bus.cdr import Codec, CodecError, codec_of
 from groundstation.bus.ros_schema import is_standard, message_text, schema_text
 from groundstation.declarations.message import Message
 from groundstation.recording.errors import RecordingError
@@ -28,8 +28,21 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
 
     Raises:
         RecordingError: The file's schema cannot be read, lacks a field of the class, or has it in another
-            type.
+            type. What is returned raises it for bytes that are no such payload.
     """
+    read = _reader(kind, recorded, where)
+
+    def decode(data: bytes) -> Message:
+        try:
+            return read(data)
+        except CodecError as error:
+            raise RecordingError(f"{where} holds a damaged message ({error})") from error
+
+    return decode
+
+
+def _reader(kind: type[Message], recorded: str, where: str) -> Decode:
+    """The same, raising CodecError for bytes that are no such payload."""
     if recorded == schema_text(kind):
         return codec_of(kind).decode
     if is_standard(kind):
@@ -47,11 +60,11 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
             raise RecordingError(f"{where} was recorded with {name} as {types[name]}, expected {ros_type}")
     wanted = [field.name for field in fields(kind)]
 
-    def decode(data: bytes) -> Message:
+    def read(data: bytes) -> Message:
         found = codec.decode(data)
         return kind(**{name: getattr(found, name) for name in wanted})
 
-    return decode
+    return read
 
 
 def _codec(kind: type[Message], columns: list[tuple[str, str]]) -> Codec[Any]:

@@ -1,9 +1,12 @@
 """The journal keeps order and names, between one publication and the next."""
 
+from dataclasses import dataclass
+
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.bus.cdr import codec_of
+from groundstation.bus.cdr import CodecError, codec_of
 from groundstation.bus.journal import (
     NO_NODE,
     Entry,
@@ -14,6 +17,7 @@ from groundstation.bus.journal import (
     packed_entries,
     read_entries,
 )
+from groundstation.declarations.message import Bytes, Message, Text, TextSequence
 
 U32 = st.integers(0, 2**32 - 1)
 notes = st.tuples(
@@ -25,6 +29,15 @@ notes = st.tuples(
     st.integers(0, 2**62),
     st.integers(0, 2**40),
 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bare(Message):
+    """The layout of a journal, whatever its entries point to."""
+
+    process: Text
+    names: TextSequence
+    entries: Bytes
 
 
 def published(journal: JournalWriter) -> Journal:
@@ -78,3 +91,23 @@ def test_a_run_that_nobody_records_keeps_no_journal():
     journal.note(Kind.TICK, "alpha/imu", "", "", 0, 5)
     assert len(journal) == 0
     assert journal.take() == ((), b"")
+
+
+@pytest.mark.parametrize(
+    ("names", "change", "sentence"),
+    [
+        (("alpha/imu", "imu", "alpha"), lambda entries: entries[:-1], "47 bytes are no whole entries"),
+        (("alpha/imu", "imu"), bytes, "points to name 2 of 2"),
+        ((), bytes, "points to name 0 of 0"),
+        (("alpha/imu", "imu", "alpha"), lambda e: e[:16] + b"\7" + e[17:], "an entry of kind 7"),
+    ],
+)
+def test_bytes_that_are_no_journal_are_no_message(names, change, sentence):
+    """Who follows a journal looks names up without a doubt: what is damaged is found when it is read."""
+    journal = JournalWriter()
+    journal.note(Kind.INPUT, "alpha/imu", "imu", "alpha", 1, 5)
+    journal.note(Kind.TICK, "alpha/imu", "imu", "alpha", 0, 6)
+    entries = change(journal.take()[1])
+    whole = codec_of(Bare).encode(Bare(0, "", "flight", names, entries))
+    with pytest.raises(CodecError, match=sentence):
+        codec_of(Journal).decode(whole)

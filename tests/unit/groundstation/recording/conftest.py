@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.bus.cdr import ros_fields
 from groundstation.bus.envelope import Delivered, Envelope
-from groundstation.bus.journal import Journal
+from groundstation.bus.journal import Journal, JournalWriter, Kind
 from groundstation.declarations.topic import Scope
 from groundstation.parts.control.messages import Wrench
 from groundstation.parts.imu.messages import ImuBytes
@@ -34,6 +34,7 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
     random = np.random.default_rng(seed)
     counts: dict = {}
     flight = []
+    journal = JournalWriter()
 
     def publish(payload, publish_ns):
         key = (type(payload), payload.vehicle)
@@ -51,7 +52,8 @@ def fly(steps: int, seed: int = 7) -> list[Delivered]:
             publish(StarImage(now_ns, "alpha", now_ns - 1, 8, 8, "mono8", 8, random.bytes(64)), now_ns)
             publish(spots(now_ns, "alpha", random.normal(size=3).astype(np.float32)), now_ns)
         if step % 10 == 9:
-            publish(Journal(now_ns, "", "flight", ("alpha/imu",), random.bytes(48)), now_ns)
+            journal.note(Kind.TICK, "alpha/imu", "", "alpha", 0, now_ns, int(random.integers(2**32)))
+            publish(Journal(now_ns, "", "flight", *journal.take()), now_ns)
     return flight
 
 

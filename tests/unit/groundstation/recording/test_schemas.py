@@ -140,6 +140,17 @@ def test_a_file_with_a_field_more_is_read(tmp_path):
     assert same(found.payload, FIX)
 
 
+@pytest.mark.parametrize("is_todays", [True, False])
+def test_a_damaged_message_is_refused_with_file_and_channel(tmp_path, is_todays):
+    columns = ros_fields(StarFix)[:: 1 if is_todays else -1]
+    data, schema = as_other(FIX, columns)
+    path = write(tmp_path / "torn.mcap", schema, data[:-9], RecordingInfo().to_metadata())
+    with Recording(path) as recording:
+        (found,) = recording.messages([StarFix])
+        with pytest.raises(RecordingError, match=r"torn\.mcap: /alpha/star_fix holds a damaged message"):
+            _ = found.payload
+
+
 @pytest.mark.parametrize(
     "metadata", [{"software": "groundstation 0.0.1"}, {"format": "1", "software": "old"}]
 )
