@@ -16,7 +16,6 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -28,6 +27,7 @@ from mcap.records import (
 )
 
 from groundstation.recording.records import MAGIC, RECORD
+from groundstation.recording.written_chunks import ENTRY_BYTES, INDEX, WrittenChunks
 
 CHUNK_BYTES = 1 << 20
 _COMPRESSION = "zstd"
@@ -36,7 +36,6 @@ LEVEL = 1
 _MESSAGE = struct.Struct("<BQHIQQ")
 _MESSAGE_HEAD = _MESSAGE.size - RECORD.size
 _CHUNK = struct.Struct("<BQQQQII4sQ")
-_INDEX = struct.Struct("<BQHI")
 _CHUNK_INDEX_BYTES = 128
 """Of a chunk in the summary, beside ten for each of its channels."""
 _FIXED_SUMMARY_BYTES = 4096
@@ -68,7 +67,7 @@ class McapFile:
         self._channels: list[Channel] = []
         self._definitions: list[bytes] = []  # records of both, in the order of their coming
         self._metadata: list[MetadataIndex] = []
-        self._chunks: list[bytes] = []  # their indexes, packed: an hour has fifteen thousand
+        self._chunks = WrittenChunks(_COMPRESSION)
         self._first_ns, self._last_ns = _NEVER_NS, 0
         self._counts: dict[int, int] = {}
         self._summary_bytes = _FIXED_SUMMARY_BYTES
@@ -77,7 +76,7 @@ class McapFile:
     @property
     def rest_bytes(self) -> int:
         """At most so many bytes are still to be written if the file is finished now."""
-        indexes = 2 * _INDEX.size * len(self._stamps_and_offsets)
+        indexes = 2 * INDEX.size * len(self._stamps_and_offsets)
         stamps = sum(8 * len(index) for index in self._stamps_and_offsets.values())
         return self._summary_bytes + self._size + indexes + stamps + _CHUNK_INDEX_BYTES
 
@@ -158,7 +157,7 @@ class McapFile:
         yield Opcode.SCHEMA, map(_packed, self._schemas)
         yield Opcode.CHANNEL, map(_packed, self._channels)
         yield Opcode.STATISTICS, [_packed(self._statistics())]
-        yield Opcode.CHUNK_INDEX, self._chunks
+        yield Opcode.CHUNK_INDEX, self._chunks.records()
         yield Opcode.ATTACHMENT_INDEX, ()
         yield Opcode.METADATA_INDEX, map(_packed, self._metadata)
 
@@ -203,37 +202,25 @@ class McapFile:
             _COMPRESSION.encode(),
             len(packed),
         )
-        offsets, indexes = self._packed_indexes(start + length)
-        self._file.write(b"".join((head, packed, indexes)))
-        for channel, index in self._stamps_and_offsets.items():
-            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
-        listed = ChunkIndex(
-            chunk_length=length,
-            chunk_start_offset=start,
-            compression=_COMPRESSION,
-            compressed_size=len(packed),
-            message_end_time=high_ns,
-            message_index_length=len(indexes),
-            message_index_offsets=offsets,
-            message_start_time=low_ns,
-            uncompressed_size=len(records),
-        )
-        self._chunks.append(_packed(listed))
+        self._file.write(b"".join((head, packed, self._packed_indexes())))
+        messages = {channel: len(index) // 2 for channel, index in self._stamps_and_offsets.items()}
+        for channel, count in messages.items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+        self._chunks.add(start, (length, len(packed), len(records)), (low_ns, high_ns), messages)
         self._first_ns, self._last_ns = min(self._first_ns, low_ns), max(self._last_ns, high_ns)
-        self._summary_bytes += _CHUNK_INDEX_BYTES + 10 * len(offsets)
+        self._summary_bytes += _CHUNK_INDEX_BYTES + 10 * len(messages)
         self._parts.clear()
         self._stamps_and_offsets.clear()
         self._size = 0
 
-    def _packed_indexes(self, position: int) -> tuple[dict[int, int], bytearray]:
-        """Where the index of each channel lies, and all of them."""
-        offsets, out = {}, bytearray()
+    def _packed_indexes(self) -> bytearray:
+        """The index of each channel: log time and offset of every message."""
+        out = bytearray()
         for channel, index in self._stamps_and_offsets.items():
-            offsets[channel] = position + len(out)
-            size = 8 * len(index)
-            out += _INDEX.pack(Opcode.MESSAGE_INDEX, 6 + size, channel, size)
+            size = len(index) // 2 * ENTRY_BYTES
+            out += INDEX.pack(Opcode.MESSAGE_INDEX, INDEX.size - RECORD.size + size, channel, size)
             out += struct.pack(f"<{len(index)}Q", *index)
-        return offsets, out
+        return out
 
 
 def _packed(record: _Record) -> bytes:

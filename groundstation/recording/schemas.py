@@ -34,9 +34,11 @@ def decoder_of(kind: type[Message], recorded: str, where: str) -> Decode:
 
     def decode(data: bytes) -> Message:
         try:
-            return read(data)
+            found = read(data)
+            found.check()
         except CodecError as error:
             raise RecordingError(f"{where} holds a damaged message ({error})") from error
+        return found
 
     return decode
 

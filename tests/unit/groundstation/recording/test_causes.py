@@ -78,3 +78,15 @@ def test_a_recording_without_journals_is_refused(tmp_path):
         pass
     with Recording(path) as recording, pytest.raises(RecordingError, match="holds no journal"):
         CauseIndex(recording)
+
+
+def test_a_journal_that_points_nowhere_is_refused_with_file_and_channel(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Recorder(path, RecordingInfo()) as recorder:
+        payload = Journal(1000, "", "lockstep", ("a", "b"), bytes(22) + b"\7\0")
+        recorder.record(Delivered(Envelope(Journal.TOPIC, "lockstep", 1, 1000), payload), 1000)
+    with Recording(path) as recording, pytest.raises(RecordingError) as refused:
+        CauseIndex(recording)
+    assert str(refused.value) == (
+        f"{path}: /lockstep/journal holds a damaged message (Journal: an entry points to name 7 of 2)"
+    )
