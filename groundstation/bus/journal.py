@@ -26,9 +26,6 @@ class Journal(Message):
         process: Its name.
         names: What the entries point into.
         entries: Packed, see ``ENTRY``.
-
-    Raises:
-        CodecError: The entries are cut off, or point to names that are not there.
     """
 
     ROS_TYPE: ClassVar[str] = f"{PACKAGE}/msg/Journal"
@@ -37,7 +34,8 @@ class Journal(Message):
     names: TextSequence
     entries: Bytes
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Refuse entries that are cut off, or point to names that are not there."""
         if len(self.entries) % ENTRY.itemsize:
             raise CodecError(f"Journal: {len(self.entries)} bytes are no whole entries")
         packed = packed_entries(self)

@@ -19,6 +19,8 @@ from groundstation.declarations.section import Section
 from groundstation.declarations.topic import Topic
 from groundstation.declarations.view import GaugeRow
 
+SHORTEST_TICK_NS = 1_000_000
+"""Between two ticks of a node: a shorter period would leave its process no time for anything else."""
 _ROS_TYPE = re.compile(r"[a-z]\w*/msg/[A-Z]\w*")
 _FIELD = re.compile(r"(bool|u?int(8|16|32|64)|float(32|64)|string)(\[\d*\])?")
 _LATER = re.compile(r"\w+(\.\w+)*:[A-Za-z_]\w*")
@@ -51,13 +53,19 @@ def wrong_inputs(kind: type[Node], payloads: Collection[type[Message]]) -> str:
 
 
 def check_node(
-    title: str, key: str, node: object, payloads: Collection[type[Message]], vehicles: Collection[str]
+    title: str,
+    key: str,
+    vehicle: str,
+    node: object,
+    payloads: Collection[type[Message]],
+    vehicles: Collection[str],
 ) -> None:
     """Refuse a node that no runner could run.
 
     Args:
         title: Its part.
         key: As in journals.
+        vehicle: Whose it is to be, empty for a node of the rig.
         node: What the part made.
         payloads: Every declared payload class.
         vehicles: Of the rig.
@@ -68,10 +76,17 @@ def check_node(
     where = f"{title}: node {key!r}"
     if not isinstance(node, Node):
         raise UsageError(f"{where} is made as {node!r:.80}, expected a Node")
-    period_ns = node.tick_period_ns
-    if not _is_count(period_ns):
+    if not hasattr(node, "vehicle") or not hasattr(node, "tick_period_ns"):
         raise UsageError(
-            f"{where}: tick_period_ns is {period_ns!r:.80}, expected whole nanoseconds from 0 up"
+            f"{where} lacks what Node gives it: its __init__ must call super().__init__(vehicle)"
+        )
+    if node.vehicle != vehicle:
+        raise UsageError(f"{where} is made for the vehicle {node.vehicle!r:.80}, expected {vehicle!r}")
+    period_ns = node.tick_period_ns
+    if not _is_count(period_ns) or 0 < period_ns < SHORTEST_TICK_NS:
+        raise UsageError(
+            f"{where}: tick_period_ns is {period_ns!r:.80}, expected whole nanoseconds, "
+            f"0 for no ticks or {SHORTEST_TICK_NS} and more"
         )
     for each in (*node.inputs, *node.outputs):
         if each not in payloads:

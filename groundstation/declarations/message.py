@@ -53,6 +53,13 @@ class Message:
     stamp_ns: int
     vehicle: str
 
+    def check(self) -> None:
+        """Refuse content that does not hold together, where bytes of a file became this payload.
+
+        Raises:
+            CodecError: With what is wrong.
+        """
+
     def __init_subclass__(cls) -> None:
         if "__slots__" in vars(cls):  # what the decorator makes in the end: the class with its slots
             quickly_made(cls)

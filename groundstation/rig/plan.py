@@ -96,7 +96,7 @@ def made(rig: Rig, placed: Placed) -> Node:
     with calling(title, f"make of node {row.name!r}"):
         node = row.make(rig, placed.vehicle)
         kind = row.node_class()  # where its module is named only, it has been imported by now
-    check_node(title, placed.key, node, payloads, rig.vehicles)
+    check_node(title, placed.key, placed.vehicle, node, payloads, rig.vehicles)
     if not isinstance(node, kind):
         raise UsageError(
             f"{title}: node {placed.key!r} is a {type(node).__name__}, its row says {row.kind!r:.80}"

@@ -57,7 +57,7 @@ def make_runner(
         extra.append(RequestPlayer(asked))
     for number, node in enumerate(extra):
         key = f"extra/{type(node).__name__}_{number}"
-        slots.append(Slot(key, node, PROCESS, journal, sequences, measure=False))
+        slots.append(Slot(key, node, PROCESS, journal, sequences, False, vehicles=rig.vehicles))
     ports = laboratory_ports(rig, laboratory.channels())
     return LockstepRunner(slots, laboratory, ports, observers, journal, sequences)
 

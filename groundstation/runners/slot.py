@@ -4,7 +4,7 @@ Whatever a node raises leaves its slot as a ``NodeError``, one sentence with its
 """
 
 import time
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
 from groundstation.bus.envelope import Cause, Delivered, Envelope
@@ -92,6 +92,7 @@ class Slot:
         sequences: The counters of the process, shared by its slots.
         measure: Whether wall times are measured (not in lockstep: they would differ per run).
         timing: Emulated duration.
+        vehicles: Of the rig: it may publish for no other. None where the rig is not known.
         busy_until_ns: When a busy node is free again.
         waiting: What waits for a busy node.
         has_failed: It raised something: it is called no more, not even to stop.
@@ -105,6 +106,7 @@ class Slot:
     sequences: Sequences
     measure: bool
     timing: Timing = field(default_factory=Timing)
+    vehicles: Collection[str] | None = None
     busy_until_ns: int = 0
     waiting: list[Delivered] = field(default_factory=list)
     has_failed: bool = False
@@ -191,6 +193,12 @@ class Slot:
         kind = type(payload)
         if kind not in self.node.outputs:
             raise NodeError(f"{self.key} published {kind.__name__}, which is not among its outputs")
-        stream = self.sequences.stream(kind.TOPIC, owner_of(kind.TOPIC, payload, self.process))
-        self._streams[kind, payload.vehicle] = stream
+        topic, vehicle, vehicles = kind.TOPIC, payload.vehicle, self.vehicles
+        if topic.scope is Scope.VEHICLE and vehicles is not None and vehicle not in vehicles:
+            raise NodeError(
+                f"{self.key} published {topic.noun} of a vehicle {vehicle!r:.80}, "
+                f"which the rig does not have (it has {', '.join(vehicles)})"
+            )
+        stream = self.sequences.stream(topic, owner_of(topic, payload, self.process))
+        self._streams[kind, vehicle] = stream
         return stream

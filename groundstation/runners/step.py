@@ -235,5 +235,7 @@ def build_slots(
         if section is not None:
             timing = Timing(round(section.busy_s * 1e9), round(section.late_s * 1e9))
         key = row.key(vehicle)
-        slots.append(Slot(key, replaced.get(key, node), process or name, journal, sequences, measure, timing))
+        node = replaced.get(key, node)
+        home = process or name
+        slots.append(Slot(key, node, home, journal, sequences, measure, timing, rig.vehicles))
     return slots

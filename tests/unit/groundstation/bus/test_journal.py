@@ -1,7 +1,5 @@
 """The journal keeps order and names, between one publication and the next."""
 
-from dataclasses import dataclass
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,7 +15,6 @@ from groundstation.bus.journal import (
     packed_entries,
     read_entries,
 )
-from groundstation.declarations.message import Bytes, Message, Text, TextSequence
 
 U32 = st.integers(0, 2**32 - 1)
 notes = st.tuples(
@@ -29,15 +26,6 @@ notes = st.tuples(
     st.integers(0, 2**62),
     st.integers(0, 2**40),
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Bare(Message):
-    """The layout of a journal, whatever its entries point to."""
-
-    process: Text
-    names: TextSequence
-    entries: Bytes
 
 
 def published(journal: JournalWriter) -> Journal:
@@ -102,12 +90,12 @@ def test_a_run_that_nobody_records_keeps_no_journal():
         (("alpha/imu", "imu", "alpha"), lambda e: e[:16] + b"\7" + e[17:], "an entry of kind 7"),
     ],
 )
-def test_bytes_that_are_no_journal_are_no_message(names, change, sentence):
+def test_entries_that_do_not_hold_together_are_refused(names, change, sentence):
     """Who follows a journal looks names up without a doubt: what is damaged is found when it is read."""
     journal = JournalWriter()
     journal.note(Kind.INPUT, "alpha/imu", "imu", "alpha", 1, 5)
     journal.note(Kind.TICK, "alpha/imu", "imu", "alpha", 0, 6)
-    entries = change(journal.take()[1])
-    whole = codec_of(Bare).encode(Bare(0, "", "flight", names, entries))
+    kept, entries = journal.take()
+    Journal(0, "", "flight", kept, entries).check()
     with pytest.raises(CodecError, match=sentence):
-        codec_of(Journal).decode(whole)
+        Journal(0, "", "flight", names, change(entries)).check()

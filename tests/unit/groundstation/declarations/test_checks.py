@@ -199,6 +199,12 @@ CALLED = {
     "a negative period": (made(period_ns=-5), "tick_period_ns is -5"),
     "a period that is a float": (made(period_ns=1e8), "tick_period_ns is 100000000.0"),
     "a period that is a bool": (made(period_ns=True), "tick_period_ns is True"),
+    "a tick each nanosecond": (made(period_ns=1), "tick_period_ns is 1, expected"),
+    "another vehicle": (made(vehicle="beta"), f"{NODE}is made for the vehicle 'beta', expected 'alpha'"),
+    "no vehicle at all": (made(vehicle=None), f"{NODE}is made for the vehicle None, expected 'alpha'"),
+    "a base that is forgotten": (
+        made(kind(__init__=lambda self, vehicle, period_ns: None)), f"{NODE}lacks what Node gives it",
+    ),
     "an input of nobody": (made(inputs=(Stray,)), f"{NODE}receives Stray"),
     "an output of nobody": (made(outputs=(Stray,)), f"{NODE}publishes Stray"),
     "an output of another part": (

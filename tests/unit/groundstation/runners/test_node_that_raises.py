@@ -1,6 +1,7 @@
 """A node that raises ends the flight with one sentence that names it; the recording holds what there was."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,8 @@ def rig_of_one():
 
 CALLS = ("start", "receive", "tick", "stop")
 BYTES = Delivered(Envelope(ImuBytes.TOPIC, "alpha", 1, 5), ImuBytes(5, "alpha", b"", math.nan))
+
+PUSH = Wrench(5, "alpha", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def raised(error):
@@ -100,6 +103,17 @@ def test_whatever_a_node_raises_leaves_its_slot_as_a_sentence_with_its_key(at, w
     assert len(str(refused.value)) < 500
     assert slot.has_failed
     assert slot.receive(BYTES, 6) == slot.tick(6) == slot.stop(6) == []  # it is called no more
+
+
+def test_a_vehicle_that_the_rig_lacks_is_published_for_by_nobody(rig_of_one):
+    """Its messages would reach nobody, and a flight would go on without a word."""
+    for vehicle in ("gamma", ""):
+        runner = make_runner(
+            rig_of_one, extra_nodes=[Rogue("tick", lambda name=vehicle: [replace(PUSH, vehicle=name)])]
+        )
+        with pytest.raises(NodeError, match=f"published wrench of a vehicle '{vehicle}', which the rig does"):
+            runner.run(200_000_000)
+        runner.close()
 
 
 def test_ctrl_c_is_nobodys_fault():
