@@ -28,6 +28,10 @@ OVERHANG_M = 0.05
 """So far beyond its part of the table a predicted stop may lie before the air is cut: noise."""
 REACTION_S = 0.15
 """Age of the state, a modulation period, the opening of a valve."""
+SINKING_S, LANDED_M_S2 = 0.5, 1.0
+"""Until the bearings carry no more, and what the table brakes with then; the worst that is expected."""
+SLIDING_ROOM_M = 0.01
+"""Left after landing, below which the air of a disarmed mock-up is cut."""
 ONLY_ALOFT = frozenset(
     {
         "star_outage",
@@ -65,7 +69,7 @@ def faults_seen(
         found["controller_silent"] = _age("demand", seen.demand_ns, now_ns)
     if is_aloft:
         found.update(_thrust(seen))
-        found.update(_motion(seen, now_ns))
+        found.update(_motion(seen, now_ns) if may_open else _sliding(seen, now_ns))
         found.update(_estimate(seen))
         found.update(_obedience(seen, now_ns, may_open=may_open))
     return found
@@ -158,6 +162,30 @@ def _motion(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:
         yield "vehicle_unavoidable", f"{first.name}: they would overlap by {-1e3 * first.room_m:.0f} mm"
     elif first.verdict is EdgeVerdict.BRAKE:
         yield "vehicle_ahead", f"{first.name}: {1e3 * first.room_m:.0f} mm would be left"
+
+
+def _sliding(seen: Sightings, now_ns: int) -> Iterator[tuple[str, str]]:
+    """Disarmed it has no brake but the table itself: the air is cut while there is room to come to rest."""
+    own = seen.own
+    if own is None or own.status != "flying" or seen.is_state_silent(now_ns):
+        return
+    outlook = edge_outlook(own.state, seen.keep_in, LANDED_M_S2, reaction_s=SINKING_S)
+    if outlook.room_m < SLIDING_ROOM_M:
+        yield "edge_unavoidable", f"disarmed it does not brake: landed now, {_left(outlook.room_m)}"
+    first = clearance(
+        own.state,
+        _to_keep_from(seen, own.state, now_ns),
+        LANDED_M_S2,
+        reaction_s=SINKING_S,
+        radius_m=seen.radius_m,
+    )
+    if first.room_m < SLIDING_ROOM_M:
+        detail = f"disarmed it does not brake: landed now, {_left(first.room_m)}"
+        yield "vehicle_unavoidable", f"{first.name}: {detail}"
+
+
+def _left(room_m: float) -> str:
+    return f"{1e3 * room_m:.0f} mm would be left" if room_m >= 0.0 else "it would not stop in time"
 
 
 def _to_keep_from(seen: Sightings, own: ControlState, now_ns: int) -> dict[str, ControlState]:

@@ -223,6 +223,29 @@ class TestMotion:
     def test_the_edge_is_seen_in_time(self, known, seen, x_m, expected):
         assert self.fly(known, seen, x_m) == expected
 
+    # disarmed, 0.1 m/s: 0.05 m until it has sunk and 0.01 / 2 = 0.005 m of sliding, 0.01 m to be left
+    @pytest.mark.parametrize(
+        ("x_m", "detail"),
+        [
+            (1.734, None),
+            (1.736, "disarmed it does not brake: landed now, 9 mm would be left"),
+            (1.75, "disarmed it does not brake: landed now, it would not stop in time"),
+        ],
+    )
+    def test_disarmed_it_does_not_wait_for_a_brake_that_it_has_not(self, known, seen, x_m, detail):
+        assert self.fly(known, seen, x_m, may_open=False).get("edge_unavoidable") == detail
+        assert self.fly(known, seen, x_m, -0.1, may_open=False) == {}  # it goes away
+
+    @pytest.mark.parametrize("apart_m", [0.366, 0.364])
+    def test_disarmed_it_lands_before_another_vehicle(self, known, seen, apart_m):
+        known.others = {"beta": seen(20 * S, (apart_m, 0.0))}
+        expected = {"vehicle_unavoidable"} if apart_m < 0.365 else set()
+        assert set(self.fly(known, seen, 0.0, may_open=False)) == expected
+
+    @pytest.mark.parametrize("status", ["resting", "lost"])
+    def test_disarmed_and_unplaced_no_edge_is_looked_for(self, known, seen, status):
+        assert "edge_unavoidable" not in self.fly(known, seen, 1.79, status=status, may_open=False)
+
     def test_on_the_ground_or_unplaced_no_edge_is_looked_for(self, known, seen):
         assert self.fly(known, seen, 1.7, is_aloft=False) == {}
         assert self.fly(known, seen, 1.7, status="resting") == {}
