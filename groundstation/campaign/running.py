@@ -13,13 +13,18 @@ from groundstation.campaign.flying import Row, packed
 from groundstation.campaign.local import fly_here
 from groundstation.campaign.page import render_page
 from groundstation.campaign.parquet import write_parquet
-from groundstation.campaign.plan import Plan, columns_of, identity
+from groundstation.campaign.plan import MOST_RUNS, Plan, columns_of, identity
 from groundstation.campaign.rows import CSV, Rows
 from groundstation.files.writing import write_file
 from groundstation.recording.software import software
 from groundstation.scenario.dispersions import SEED
 from groundstation.scenario.loading import Scenario
-from groundstation.scenario.rehearsal import check_dispersions, check_extremes, check_failures
+from groundstation.scenario.rehearsal import (
+    check_dispersions,
+    check_extremes,
+    check_failures,
+    check_varied,
+)
 
 Progress = Callable[[int, int], None]
 REPORT = "report.html"
@@ -49,8 +54,12 @@ def check(scenario: Scenario, plan: Plan) -> None:
     check_extremes(scenario)
     if plan.sweep is not None and plan.sweep.key == SEED:
         raise CampaignError(f"--sweep {SEED}: each run has a seed of its own, drawn from --seed")
-    for run in {0, plan.count - 1} if plan.sweep is not None else ():
-        check_failures(scenario.vary(plan.changes(scenario, run)))
+    if plan.count > MOST_RUNS:
+        raise CampaignError(f"{plan.count} runs are too many: a campaign has {MOST_RUNS} at most")
+    if plan.sweep is not None:
+        for run in (0, plan.count - 1):
+            value = plan.sweep.values[run // plan.runs]
+            check_varied(scenario, plan.changes(scenario, run), f"--sweep {plan.sweep.key} = {value:g}")
 
 
 def run_campaign(

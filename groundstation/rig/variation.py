@@ -1,6 +1,6 @@
 """A rig with some of its keys changed: for dispersions, sweeps and tests, without another file."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -18,7 +18,8 @@ def varied(rig: Rig, changes: Mapping[str, object]) -> Rig:
     Args:
         rig: As it was read.
         changes: By key, as the file spells it: ``mock_ups.standard.mass_kg``. An entry of a list of tables
-            is found by its name: ``laboratory.alpha.mass_kg`` is that of ``[[laboratory.vehicles]]``.
+            is found by its name: ``laboratory.alpha.mass_kg`` is that of ``[[laboratory.vehicles]]``; one
+            without a name by its number from 0, as those of a list: ``laboratory.table.tilt_rad.0``.
 
     Raises:
         RigError: A key leads nowhere, or the rig refuses its value.
@@ -35,17 +36,36 @@ def _set(content: dict[str, Any], key: str, value: object) -> None:
     found: object = content
     for place, name in enumerate(way):
         inside = _step(found, name)
-        if inside is None and place >= OPTIONAL_FROM and isinstance(found, dict) and name not in found:
+        is_list = [*way, last][place + 1].isdecimal()
+        if inside is None and place >= OPTIONAL_FROM and isinstance(found, dict) and not is_list:
             inside = found[name] = {}  # the file leaves it out; no key of it is refused later
         if inside is None:
-            raise RigError(f"{'.'.join(way[: place + 1])}: the rig has no such table")
+            what = "the rig's file writes no such list" if is_list else "the rig has no such table"
+            raise RigError(f"{'.'.join(way[: place + 1])}: {what}")
         found = inside
-    if not isinstance(found, dict):
+    if isinstance(found, dict):
+        found[last] = value
+        return
+    if not isinstance(found, list):
         raise RigError(f"{'.'.join(way)}: is no table of the rig")
-    found[last] = value
+    place = place_in(found, last)
+    if place is None:
+        raise RigError(f"{'.'.join(way)}: is a list of {len(found)}, numbered from 0")
+    found[place] = value
+
+
+def place_in(entries: Sequence[object], name: str) -> int | None:
+    """The place in a list that a key names by its number; None for what it has not, or has by a name."""
+    for place, entry in enumerate(entries):
+        if name == str(place) and not (isinstance(entry, dict) and "name" in entry):
+            return place
+    return None
 
 
 def _step(table: object, name: str) -> object:
+    if isinstance(table, list):
+        place = place_in(table, name)
+        return None if place is None else table[place]
     if not isinstance(table, dict):
         return None
     if name in table:
@@ -70,4 +90,4 @@ def value_at(rig: Rig, key: str) -> object:
         found = _step(found, name)
         if found is None and place < OPTIONAL_FROM:
             raise RigError(f"{'.'.join(way[: place + 1])}: the rig has no such table")
-    return found.get(last) if isinstance(found, dict) else None
+    return found.get(last) if isinstance(found, dict) else _step(found, last)

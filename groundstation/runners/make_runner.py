@@ -12,6 +12,7 @@ from groundstation.declarations.errors import RigError
 from groundstation.declarations.node import Node
 from groundstation.declarations.request import Request
 from groundstation.declarations.rig import Rig
+from groundstation.declarations.validation import first_sentence
 from groundstation.rig.plan import laboratory_ports
 from groundstation.runners.lockstep import PROCESS, LockstepRunner, Observer
 from groundstation.runners.requests import RequestPlayer
@@ -73,7 +74,9 @@ def open_laboratory(rig: Rig, seed: int | None) -> Laboratory:
     try:
         return load_laboratory(rig.laboratory.name, rig.laboratory.table, seed_of(rig, seed))
     except ValidationError as error:
-        raise RigError(_sentence(error, rig.laboratory.table)) from error
+        table = rig.laboratory.table
+        sentence = first_sentence(error, lambda way: ("laboratory", *_named(way, table)))
+        raise RigError(sentence) from error
     except (NotFound, ValueError) as error:  # or a file of the laboratory
         raise RigError(str(error)) from error
 
@@ -91,14 +94,6 @@ def seed_of(rig: Rig, seed: int | None) -> int:
     if not isinstance(found, int) or isinstance(found, bool) or found < 0:
         raise RigError(f"laboratory.seed: expected a whole number from 0 up, found {found!r}")
     return found
-
-
-def _sentence(error: ValidationError, table: Mapping[str, object]) -> str:
-    first = error.errors()[0]
-    key = ".".join(("laboratory", *_named(first["loc"], table)))
-    if first["type"] == "extra_forbidden":
-        return f"'{key}' is no known key (a typo?)"
-    return f"{key}: {first['msg'].removeprefix('Value error, ')}"
 
 
 def _named(way: Sequence[object], table: object) -> Iterator[str]:

@@ -18,6 +18,8 @@ from groundstation.scenario.scenario_file import ALL, FOLLOWERS, ScenarioFile
 from groundstation.scenario.timeline import Changes, timeline_rows
 
 OWN_SECTION = "scenario"
+STARTS = ("start_m", "start_heading_deg")
+"""Where a vehicle of the emulated laboratory stands at first."""
 
 
 def compiled_rig(file: ScenarioFile, rig: Rig, *, is_hardware: bool = False) -> Rig:
@@ -68,24 +70,44 @@ def _check_changes(file: ScenarioFile, rig: Rig) -> None:
     Raises:
         KeyTroubleError: A key is written without quotes, or what it changes does not fly.
     """
-    for key, value in file.changes.items():
+    instead = dict(_instead(file))
+    for number, (key, value) in enumerate(file.changes.items()):
         names = key.split(".")
         if names[0] == OWN_SECTION:
             raise KeyTroubleError(f"changes.{key}: '{OWN_SECTION}' is what the timeline is written into")
         if len(names) == 1 and isinstance(value, Mapping):
             inside = next((inner for inner, _ in _leaves(key, value)), f"{key}.…")
             raise KeyTroubleError(f'changes.{key}: write the whole key in quotes, "{inside}" = …')
-        keys = file.vehicles.get(names[1]) if names[0] == "vehicles" and len(names) > 2 else None
-        own = {"hold": "start", "control": "control"}.get(names[2], "") if keys is not None else ""
-        if own and getattr(keys, own) is not None:
-            raise KeyTroubleError(
-                f"changes.{key}: vehicles.{names[1]}.{own} stands in its place: change that"
-            )
+        for own, written in instead.items():
+            if _is_of(key, own):
+                raise KeyTroubleError(f"changes.{key}: {written} stands in its place: change that")
+        for earlier in list(file.changes)[:number]:
+            if _is_of(earlier, key):
+                raise KeyTroubleError(f"changes.{earlier}: {key} below it stands in its place")
         if names[0] == "mock_ups" and names[2:3] == ["control"] and not _flown_by_type(file, rig, names[1]):
             raise KeyTroubleError(
                 f"changes.{key}: changes nothing, each {names[1]!r} has a controller of its own: "
                 "vehicles.….control"
             )
+
+
+def _instead(file: ScenarioFile) -> Iterator[tuple[str, str]]:
+    """Keys of the rig that the scenario's own keys are written into, and the scenario's."""
+    if file.obstacles:
+        yield "table.keep_out", "obstacles"
+    for name, keys in file.vehicles.items():
+        if keys.start is not None:
+            for own in (f"vehicles.{name}.hold", *(f"laboratory.{name}.{key}" for key in STARTS)):
+                yield own, f"vehicles.{name}.start"
+        if keys.control is not None:
+            yield f"vehicles.{name}.control", f"vehicles.{name}.control"
+        for key, _ in _leaves("laboratory", keys.laboratory):
+            yield f"laboratory.{name}.{key.partition('.')[2]}", f"vehicles.{name}.{key}"
+
+
+def _is_of(key: str, table: str) -> bool:
+    """Whether a key is another one, or inside it."""
+    return f"{key}.".startswith(f"{table}.")
 
 
 def _flown_by_type(file: ScenarioFile, rig: Rig, mock_up: str) -> bool:
@@ -126,8 +148,8 @@ def _changes(file: ScenarioFile, rig: Rig, *, is_hardware: bool) -> Changes:
         if is_hardware or rig.laboratory is None:
             continue
         if keys.start is not None:
-            changes[f"laboratory.{name}.start_m"] = [keys.start.x_m, keys.start.y_m]
-            changes[f"laboratory.{name}.start_heading_deg"] = keys.start.heading_deg
+            values = [keys.start.x_m, keys.start.y_m], keys.start.heading_deg
+            changes |= {f"laboratory.{name}.{key}": value for key, value in zip(STARTS, values, strict=True)}
         changes |= dict(_leaves(f"laboratory.{name}", keys.laboratory))
     return changes
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.declarations.errors import RigError
 from groundstation.declarations.rig import Rig
-from groundstation.rig.variation import value_at
+from groundstation.rig.variation import place_in, value_at
 from groundstation.scenario.loading import Scenario, is_of_scenario
 from groundstation.scenario.scenario_file import Dispersion, ScenarioError
 
@@ -131,8 +131,9 @@ def _value(scenario: Scenario, key: str) -> object:
             return getattr(scenario.rig.vehicles[names[1]].hold, names[3], None)
         found: object = scenario.content
         for name in names:
-            if isinstance(found, list) and name.isdecimal() and int(name) < len(found):
-                found = found[int(name)]
+            if isinstance(found, list):
+                place = place_in(found, name)
+                found = None if place is None else found[place]
             else:
                 found = found.get(name) if isinstance(found, dict) else None
         return found

@@ -1,5 +1,6 @@
 """A scenario as it was read: its file, its rig, and the same with other values."""
 
+import contextlib
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from groundstation.files.reading import path_of
 from groundstation.parts.control.sections import control_of
 from groundstation.parts.scenario.sections import ScenarioOfRig, ScenarioSection
 from groundstation.rig.read import load_rig, read_text, source_of
-from groundstation.rig.variation import varied
+from groundstation.rig.variation import place_in, varied
 from groundstation.scenario.compiling import compiled_rig, groups_of
 from groundstation.scenario.key_trouble import KeyTroubleError
 from groundstation.scenario.limits import check_limits
@@ -133,11 +134,19 @@ def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenar
     """
     file = parse_content(content, path)
     if base is None:
-        try:
-            base = load_rig(path.parent / path_of(file.rig))
-        except UsageError as error:
-            raise ScenarioError(f"{path}: rig: {error}") from error
+        base = _base(path, path.parent / path_of(file.rig))
     return Scenario(path, content, file, base, _compiled(file, path, base))
+
+
+def _base(path: Path, rig: Path) -> Rig:
+    try:
+        return load_rig(rig)
+    except UsageError as error:
+        reason = str(error)
+        with contextlib.suppress(UsageError):
+            if is_scenario(content_of(read_text(rig, WHAT), rig)):
+                reason = f"{rig} is a scenario itself: name the rig that flies it"
+        raise ScenarioError(f"{path}: rig: {reason}") from error
 
 
 def rig_text(rig: Rig) -> str:
@@ -177,7 +186,8 @@ def _set(content: dict[str, Any], key: str, value: object, scenario: Scenario) -
             keys.setdefault("control", section.model_dump(include={"controller", "parameters"}))
     for place, name in enumerate(way):
         if isinstance(found, list):
-            found = found[int(name)] if name.isdecimal() and int(name) < len(found) else None
+            at = place_in(found, name)
+            found = None if at is None else found[at]
         elif isinstance(found, dict):
             found = found.setdefault(name, {}) if way[:1] == ["vehicles"] else found.get(name)
         if not isinstance(found, dict | list):

@@ -6,15 +6,16 @@ touches the edge, another one or an obstacle, where a limit fails, or where a wa
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
-from drivers.laboratory import LABORATORY_CHANNEL, FailureRefused, InjectOrder
+from drivers.laboratory import LABORATORY_CHANNEL, FailureRefused, InjectOrder, Laboratory
 from groundstation.declarations.errors import RigError, UsageError
 from groundstation.declarations.rig import Rig
 from groundstation.parts.laboratory.failure_desk import INJECT
 from groundstation.parts.scenario.sections import ScenarioOfRig
 from groundstation.rig.provenance import file_hashes
-from groundstation.rig.read import load_rig
+from groundstation.rig.read import load_rig, source_of
 from groundstation.runners.make_runner import open_laboratory
 from groundstation.scenario.dispersions import draw, extremes, laboratory_seed
 from groundstation.scenario.judging import Judged
@@ -34,10 +35,7 @@ def check_failures(scenario: Scenario) -> None:
     Raises:
         ScenarioError: The laboratory refuses one, or what the scenario changes.
     """
-    try:
-        laboratory = open_laboratory(scenario.rig, 0)
-    except RigError as error:
-        raise ScenarioError(f"{scenario.path}: {error}") from error
+    laboratory = _opened(scenario)
     try:
         for moment, row in enumerate(scenario.section.timeline, 1):
             if row.action != INJECT.name:
@@ -57,6 +55,26 @@ def check_failures(scenario: Scenario) -> None:
         laboratory.close()
 
 
+def _opened(scenario: Scenario) -> Laboratory:
+    """The laboratory of a scenario; a mistake of its rig is the rig's."""
+    try:
+        return open_laboratory(scenario.rig, 0)
+    except RigError as error:
+        try:
+            open_laboratory(scenario.base, 0).close()
+        except RigError as its:
+            raise ScenarioError(f"{source_of(scenario.base).path}: {its}") from its
+        raise ScenarioError(f"{scenario.path}: {_spelled(scenario, str(error))}") from error
+
+
+def _spelled(scenario: Scenario, reason: str) -> str:
+    """A sentence of the laboratory with the key as the scenario spells it."""
+    for name, keys in scenario.file.vehicles.items():
+        for key in keys.laboratory:
+            reason = reason.replace(f"laboratory.vehicles.{name}.{key}", f"vehicles.{name}.laboratory.{key}")
+    return reason.replace("laboratory.vehicles.", "laboratory.")
+
+
 def check_dispersions(scenario: Scenario) -> None:
     """Draw once, and see whether rig and laboratory take it.
 
@@ -68,14 +86,13 @@ def check_dispersions(scenario: Scenario) -> None:
         return
     try:
         check_failures(scenario.vary(drawn))
-    except UsageError:
+    except UsageError as together:
         for key, value in drawn.items():
             try:
                 check_failures(scenario.vary({key: value}))
             except UsageError as error:
-                reason = str(error).removeprefix(f"{scenario.path}: ")
-                raise ScenarioError(f"{scenario.path}: dispersions.{key}: {reason}") from error
-        raise
+                raise _refused(scenario, f"dispersions.{key}", error) from error
+        raise _refused(scenario, "dispersions", together) from together
 
 
 def check_extremes(scenario: Scenario) -> None:
@@ -88,9 +105,30 @@ def check_extremes(scenario: Scenario) -> None:
         try:
             check_failures(scenario.vary(changes))
         except UsageError as error:
-            reason = str(error).removeprefix(f"{scenario.path}: ")
             value = next(iter(changes.values()))
-            raise ScenarioError(f"{scenario.path}: dispersions.{pattern}: {value!r}: {reason}") from error
+            raise _refused(scenario, f"dispersions.{pattern}: {value!r}", error) from error
+
+
+def check_varied(scenario: Scenario, changes: Mapping[str, object], what: str) -> None:
+    """Try what somebody changes besides the file.
+
+    Args:
+        scenario: As its file has it.
+        changes: By key.
+        what: What they come from, for the sentence.
+
+    Raises:
+        ScenarioError: Rig or laboratory refuse it.
+    """
+    try:
+        check_failures(scenario.vary(changes))
+    except UsageError as error:
+        raise _refused(scenario, what, error) from error
+
+
+def _refused(scenario: Scenario, what: str, error: UsageError) -> ScenarioError:
+    reason = str(error).removeprefix(f"{scenario.path}: ").removeprefix("changes.")
+    return ScenarioError(f"{scenario.path}: {what}: {reason}")
 
 
 def twin_of(rig: Rig) -> Rig:

@@ -31,6 +31,9 @@ Name = Annotated[str, Field(pattern=f"^{PATTERN}$")]
 class ScenarioError(UsageError):
     """The scenario file is wrong; the text is one sentence with file and key."""
 
+    def __init__(self, text: str) -> None:
+        super().__init__(in_one_line(text))
+
 
 class ControlKeys(Section):
     """Which controller flies a vehicle in this scenario, and its parameters."""
@@ -176,7 +179,7 @@ class ScenarioFile(PlainModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: Words
-    rig: str
+    rig: Annotated[str, Field(min_length=1)]
     duration_s: Span
     ready_s: Span = 60.0
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None

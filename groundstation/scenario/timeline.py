@@ -49,7 +49,7 @@ def timeline_rows(file: ScenarioFile, rig: Rig, groups: Groups) -> Iterator[Chan
         else:
             assert row.vehicle is not None
             vehicles = members(f"{key}.vehicle", row.vehicle, groups)
-            action, arguments = _asked(row, key, rig, file)
+            action, arguments = _asked(row, key, rig, file, vehicles)
             made |= {"vehicles": list(vehicles), "action": action, "arguments": json.dumps(arguments)}
             made["answer"] = row.answer
         yield made
@@ -74,7 +74,9 @@ def _needs_settling(condition: Condition) -> bool:
     return any(term.flag == SETTLED for term in condition.terms)
 
 
-def _asked(row: Row, key: str, rig: Rig, file: ScenarioFile) -> tuple[str, dict[str, Any]]:
+def _asked(
+    row: Row, key: str, rig: Rig, file: ScenarioFile, vehicles: tuple[str, ...]
+) -> tuple[str, dict[str, Any]]:
     """Action and arguments, in radians."""
     if row.failure is not None:
         parameters = json.dumps(row.parameters)
@@ -90,6 +92,8 @@ def _asked(row: Row, key: str, rig: Rig, file: ScenarioFile) -> tuple[str, dict[
         raise KeyTroubleError(f"{key}.request: {row.request!r} is no action (there are: {known})")
     given = _arguments(actions[row.request], row, key)
     if row.request == GO_TO.name and row.answer == "accepted":
+        if len(vehicles) > 1:
+            raise KeyTroubleError(f"{key}.arguments: {' and '.join(vehicles)} cannot be sent to one place")
         refusal = off_place(float(given["x_m"]), float(given["y_m"]), rig, file.obstacles)
         if refusal:
             raise KeyTroubleError(f"{key}.arguments: {refusal}")

@@ -261,6 +261,21 @@ def test_one_run_is_flown_again_and_recorded(file, rows, tmp_path, capsys):
     assert f"run 3: {verdict}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("sweep", "words"),
+    [("laboratory.alpha.mas_kg=10:12:2", "--sweep laboratory.alpha.mas_kg = 10: "),
+     ("laboratory.alpha.mass_kg=12:-1:2", "--sweep laboratory.alpha.mass_kg = -1: "),
+     ("laboratory.beta.mass_kg=10:12:600000", "1200000 runs are too many")],
+)  # fmt: skip
+def test_a_sweep_that_cannot_be_flown_is_one_sentence(file, tmp_path, capsys, sweep, words):
+    asked = ["--runs", "2", "--out", str(tmp_path / "c"), "--sweep", sweep]
+    assert call(["campaign", str(file), *asked]) == 2
+    sentence = capsys.readouterr().err
+    assert words in sentence
+    assert sentence.count("\n") == 1
+    assert not (tmp_path / "c").exists()
+
+
 def test_a_sweep_gives_its_key_a_column(file, tmp_path):
     words = ["campaign", str(file), "--runs", "1", "--out", str(tmp_path / "c"), "--workers", "1"]
     assert call([*words, "--sweep", "laboratory.beta.mass_kg=10:12:2"]) == 0

@@ -57,12 +57,20 @@ def test_a_parameter_of_the_rigs_controller_is_varied_by_the_name_of_its_vehicle
         ('"mock_ups.standard.control.parameters.kp" = 3.0', "parameters.kp: is no parameter"),
         ("mock_ups.standard.mass_kg = 12.0", '"mock_ups.standard.mass_kg"'),
         ('"vehicles.alpha.hold.x_m" = 0.1', "vehicles.alpha.start stands in its place"),
+        ('"laboratory.alpha.mass_kg" = 12.0', "vehicles.alpha.laboratory.mass_kg stands in its place"),
+        ('"laboratory.alpha.start_m" = [0.0, 0.0]', "vehicles.alpha.start stands in its place"),
+        ('"table.keep_out" = []', "obstacles stands in its place"),
+        (
+            '"vehicles.beta.hold.x_m" = 0.1\n"vehicles.beta.hold" = { x_m = 0.2, y_m = 0.0 }',
+            "vehicles.beta.hold.x_m: vehicles.beta.hold below it stands in its place",
+        ),
         ('"vehicles.beta.control.controller" = "path"', "vehicles.beta.control stands in its place"),
     ],
 )
 def test_a_change_that_would_change_nothing_is_refused(loaded, lines, words):
     own = (
         "[vehicles.alpha]\nstart = { x_m = -0.5, y_m = 0.0, heading_deg = 0.0 }\n"
+        "laboratory = { mass_kg = 11.5 }\n[[obstacles]]\nx_m = 0.0\ny_m = 1.0\nradius_m = 0.1\n"
         '[vehicles.beta]\ncontrol = { controller = "go_to" }\n'
     )
     with pytest.raises(UsageError) as caught:

@@ -9,6 +9,7 @@ from groundstation.declarations.errors import UsageError
 from groundstation.rig.variation import value_at
 from groundstation.scenario.dispersions import draw, expanded_keys, laboratory_seed
 from groundstation.scenario.loading import load
+from groundstation.scenario.rehearsal import check_failures
 
 RIG = Path(__file__).parents[4] / "examples/rigs/two_mock_ups_drawn.toml"
 HEAD = f'name = "t"\nrig = "{RIG.as_posix()}"\nduration_s = 20.0\n[dispersions]\n'
@@ -52,6 +53,32 @@ def test_laws_have_their_moments(scenario):
     assert set(rates) == {5.0, 10.0}
     assert np.mean(rates == 5.0) == pytest.approx(0.5, abs=0.05)
     assert abs(np.corrcoef(mass, other)[0, 1]) < 0.1
+
+
+def test_a_place_of_a_list_is_drawn_by_its_number(scenario):
+    plan = scenario(
+        '"laboratory.table.tilt_rad.0" = { add_normal = [0.0, 1e-4] }\n'
+        '"laboratory.table.tilt_rad.1" = { uniform = [-2e-4, 2e-4] }\n'
+    )
+    drawn = draw(plan, 1, 0)
+    assert column(plan, "laboratory.table.tilt_rad.0", 200).mean() == pytest.approx(3e-4, abs=3e-5)
+    assert value_at(plan.vary(drawn).rig, "laboratory.table.tilt_rad") == list(drawn.values())
+    assert value_at(plan.rig, "laboratory.table.tilt_rad") == [3e-4, -1e-4]
+
+
+def test_the_thrust_of_a_valve_is_drawn_where_the_rig_writes_it(scenario, tmp_path):
+    thrusters = "".join(
+        "[[laboratory.vehicles.thrusters]]\nposition_body_m = [0.1, 0.1]\ndirection_body = [1.0, 0.0]\n"
+        for _ in range(8)
+    )
+    rig = tmp_path / "rig.toml"
+    rig.write_text(RIG.read_text() + thrusters)
+    scenario("")
+    path = tmp_path / "scenario.toml"
+    path.write_text(path.read_text().replace(RIG.as_posix(), rig.name))
+    varied = load(path).vary({"laboratory.beta.thrusters.3.thrust_n": 0.2})
+    assert value_at(varied.rig, "laboratory.beta.thrusters.3.thrust_n") == 0.2
+    check_failures(varied)
 
 
 def test_a_run_is_the_same_whatever_else_is_drawn_and_another_for_another_seed_or_run(scenario):

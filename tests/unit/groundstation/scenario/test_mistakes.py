@@ -164,6 +164,40 @@ MISTAKES = {
     "dispersion of no vehicle": ('"laboratory.alpha.mass_kg"', '"vehicles.gamma.start.x_m"', ["gamma"]),
     "dispersion of no table": ('"laboratory.alpha.mass_kg"', '"mock_ups.stand.mass_kg"', ["mock_ups.stand"]),
     "dispersion without a law": ("{ normal = [11.0, 0.2] }", "{ }", ["dispersions", "one of"]),
+    "dispersion of a list that is not written": (
+        '"laboratory.alpha.mass_kg"', '"laboratory.alpha.thrusters.0.thrust_n"',
+        ["dispersions.laboratory.alpha.thrusters.0.thrust_n", "writes no such list"],
+    ),
+    "dispersion behind the end of a list": (
+        '"laboratory.alpha.mass_kg"', '"laboratory.table.tilt_rad.2"',
+        ["dispersions.laboratory.table.tilt_rad.2", "a list of 2"],
+    ),
+    "dispersion of a place by a second spelling": (
+        '"laboratory.alpha.mass_kg"', '"laboratory.vehicles.0.mass_kg"', ["laboratory.vehicles"],
+    ),
+    "dispersion of a place of very many digits": (
+        '"laboratory.alpha.mass_kg"', f'"timeline.{"1" * 5000}.at_s"', ["dispersions.timeline.1111"],
+    ),
+    "dispersion of what a start stands in place of": (
+        '"laboratory.alpha.mass_kg" = { normal = [11.0, 0.2] }',
+        '"laboratory.alpha.start_heading_deg" = { normal = [0.0, 2.0] }',
+        ["dispersions.laboratory.alpha.start_heading_deg", "vehicles.alpha.start stands in its place"],
+    ),
+    "two spellings of one dispersion": (
+        '{ normal = [11.0, 0.2] }',
+        '{ normal = [11.0, 0.2] }\n"vehicles.alpha.laboratory.mass_kg" = { normal = [11.0, 0.2] }',
+        ["dispersions: laboratory.alpha.mass_kg", "vehicles.alpha.laboratory.mass_kg stands in its place"],
+    ),
+    "key of the laboratory": (
+        "[vehicles.alpha]", '[vehicles.alpha]\nlaboratory = { mass_kg = "heavy" }',
+        [": vehicles.alpha.laboratory.mass_kg: ", "found 'heavy'"],
+    ),
+    "all sent to one place": ('vehicle = "beta"', 'vehicle = "all"',
+                              ["timeline.0", "alpha and beta", "one place"]),
+    "no list": ('vehicles = ["alpha", "beta"]', 'vehicles = "all"', ["limits.0.vehicles: expected a list"]),
+    "rig without a name": (RIG.as_posix(), "", [": rig: "]),
+    "rig of a very long name": (RIG.as_posix(), "a" * 5000, [": rig: ", "aaa... cannot be read"]),
+    "rig that is the scenario": (RIG.as_posix(), "wrong.toml", [": rig: ", "is a scenario itself"]),
     "nothing to add to": ("{ normal = [11.0, 0.2] }", "{ add_normal = [11.0, 0.2] }",
                           ["dispersions.laboratory.alpha.mass_kg", "add"]),
 }  # fmt: skip
@@ -195,6 +229,7 @@ def test_a_mistake_is_one_sentence_with_file_and_key(mistake: str, tmp_path: Pat
         assert word in sentence, sentence
     assert "wrong.toml" in sentence, sentence
     assert "\n" not in sentence
+    assert len(sentence) < 1500
 
 
 @pytest.mark.parametrize(
@@ -207,6 +242,14 @@ def test_what_a_campaign_may_draw_is_tried_before_it_flies(law, value, tmp_path)
     path.write_text(GOOD.replace("{ normal = [11.0, 0.2] }", law))
     with pytest.raises(UsageError, match=re.escape(f"dispersions.laboratory.alpha.mass_kg: {value}: ")):
         check_extremes(load(path))
+
+
+def test_a_mistake_in_the_laboratory_of_a_rig_is_that_of_its_file(tmp_path):
+    rig, path = tmp_path / "rig.toml", tmp_path / "scenario.toml"
+    rig.write_text(RIG.read_text().replace("tilt_rad = [0.0003, -0.0001]", "tilt_rad = 0.0003"))
+    path.write_text(GOOD.replace(RIG.as_posix(), rig.name))
+    with pytest.raises(UsageError, match=re.escape(f"{rig}: laboratory.table.tilt_rad: expected a list")):
+        check_failures(load(path))
 
 
 def test_a_rig_is_no_scenario():
