@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.campaign.plan import Plan, columns_of, limit_columns
-from groundstation.declarations.calls import described
+from groundstation.declarations.calls import described, in_one_line
 from groundstation.declarations.errors import GroundStationError
 from groundstation.rig.read import build_rig, bytes_of, source_of
 from groundstation.scenario.loading import Scenario, made
@@ -75,7 +75,7 @@ def fly_run(package: Package, run: int) -> Row:
         row |= {key: written(value) for key, value in changes.items()}
         judged = fly(scenario.vary(changes), plan.laboratory_seed(run))
     except GroundStationError as error:
-        return row | {"verdict": ERROR, "reason": str(error)}
+        return row | {"verdict": ERROR, "reason": in_one_line(str(error))}
     except Exception as error:  # of a controller or part of somebody's own: a row, not the end
         return row | {"verdict": ERROR, "reason": described(error)}
     row |= {"verdict": judged.verdict.verdict, "reason": judged.verdict.reason}

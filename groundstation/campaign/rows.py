@@ -1,7 +1,8 @@
 """Rows of a campaign on disk: in order, each there as soon as its run is over, none twice.
 
 ``runs.csv`` holds the rows in order. Runs that are over before an earlier one wait in ``unordered.jsonl``
-beside it, which is gone when all are in order. A line that a crash has torn is flown again.
+beside it, which is gone when all are in order. A line that a crash has torn, or that somebody has edited into
+what no run can be, is flown again; the others stay.
 """
 
 import contextlib
@@ -10,15 +11,15 @@ import fcntl
 import io
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
 
 from groundstation.campaign.errors import CampaignError
 from groundstation.campaign.flying import Row
+from groundstation.campaign.known_rows import NUMBER, rows_of, text_of, waiting_rows
 from groundstation.files.errors import FileError
-from groundstation.files.reading import read_bytes
 from groundstation.files.writing import write_file
 
 CSV, WAITING, STATED = "runs.csv", "unordered.jsonl", "campaign.json"
@@ -32,6 +33,7 @@ class Rows:
         columns: Of the rows.
         identity: What has to be equal for a campaign to be continued.
         resume: Whether one that is there is continued.
+        is_right: Whether a row that is there is one of this campaign.
 
     Raises:
         CampaignError: There is a campaign, and it is not to be continued or is another one; or the folder
@@ -39,9 +41,16 @@ class Rows:
     """
 
     def __init__(
-        self, folder: Path, columns: tuple[str, ...], identity: Mapping[str, object], *, resume: bool
+        self,
+        folder: Path,
+        columns: tuple[str, ...],
+        identity: Mapping[str, object],
+        *,
+        resume: bool,
+        is_right: Callable[[Row], bool] = lambda row: True,
     ) -> None:
         self._folder = folder
+        self._is_right = is_right
         self._columns = columns
         self._waiting: dict[int, Row] = {}
         self._next = 0
@@ -101,7 +110,7 @@ class Rows:
 
     def read(self) -> list[Row]:
         """The rows in order."""
-        return list(_rows_of(self._folder / CSV, self._columns).values())
+        return [row for _, row in self._among(rows_of(self._folder / CSV, self._columns))]
 
     def __enter__(self) -> Self:
         return self
@@ -133,23 +142,23 @@ class Rows:
             return
         if not resume:
             raise CampaignError(f"{self._folder} holds a campaign: --resume goes on with it")
-        differ = _differences(_text(path), json.loads(stated))
+        differ = _differences(text_of(path), json.loads(stated))
         if differ:
             raise CampaignError(
                 f"{self._folder} holds another campaign, by {STATED} in it: not the same {', '.join(differ)}"
             )
 
     def _known(self) -> dict[int, Row]:
-        known = _rows_of(self._folder / CSV, self._columns)
-        journal = self._folder / WAITING
-        for line in _text(journal).splitlines() if journal.exists() else ():
-            try:
-                row = json.loads(line)
-            except ValueError:
-                continue  # torn: flown again
-            if isinstance(row, dict) and tuple(row) == self._columns and str(row["run"]).isdecimal():
-                known.setdefault(int(row["run"]), row)
+        known = dict(self._among(rows_of(self._folder / CSV, self._columns)))
+        for run, row in self._among(waiting_rows(self._folder / WAITING, self._columns)):
+            known.setdefault(run, row)
         return known
+
+    def _among(self, rows: Iterable[Row]) -> Iterator[tuple[int, Row]]:
+        """Those that are of this campaign, with their numbers."""
+        for row in rows:
+            if NUMBER.fullmatch(row["run"]) and self._is_right(row):
+                yield int(row["run"]), row
 
     def _begun(self, known: Mapping[int, Row]) -> TextIO:
         """The file with the rows that are in order, written anew."""
@@ -206,10 +215,6 @@ def _locked(folder: Path) -> int:
     return held
 
 
-def _text(path: Path) -> str:
-    return read_bytes(path).decode(errors="replace").replace("\r\n", "\n")
-
-
 def _differences(text: str, stated: Mapping[str, object]) -> list[str]:
     """What is not the same in two statements of what a campaign is of."""
     try:
@@ -219,29 +224,6 @@ def _differences(text: str, stated: Mapping[str, object]) -> list[str]:
     if not isinstance(found, dict):
         return ["statement: it is damaged"]
     return [name for name in stated if name not in found or found[name] != stated[name]]
-
-
-def _rows_of(path: Path, columns: tuple[str, ...]) -> dict[int, Row]:
-    """Whole rows of a file, up to the first that is torn."""
-    if not path.exists():
-        return {}
-    text = _text(path)
-    whole = text[: text.rfind("\n") + 1]
-    found: dict[int, Row] = {}
-    for number, cells in enumerate(_cells(whole)):
-        if number == 0:
-            continue
-        if len(cells) != len(columns) or cells[0] != str(number - 1):
-            break
-        found[number - 1] = dict(zip(columns, cells, strict=True))
-    return found
-
-
-def _cells(text: str) -> Iterator[list[str]]:
-    try:
-        yield from csv.reader(io.StringIO(text, newline=""), strict=True)
-    except csv.Error:
-        return  # torn in the middle of a quoted reason: what follows is flown again
 
 
 def _to_disk(file: TextIO) -> None:

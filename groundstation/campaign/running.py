@@ -10,6 +10,7 @@ from pathlib import Path
 from groundstation.campaign.cluster import fly_there
 from groundstation.campaign.errors import CampaignError
 from groundstation.campaign.flying import Row, packed
+from groundstation.campaign.known_rows import row_check
 from groundstation.campaign.local import fly_here
 from groundstation.campaign.page import render_page
 from groundstation.campaign.parquet import write_parquet
@@ -83,7 +84,7 @@ def run_campaign(
     columns = columns_of(scenario, plan)
     token = hashlib.sha256(json.dumps(stated, sort_keys=True, default=str).encode()).hexdigest()[:16]
     package = packed(scenario, plan, f"{token}-{time.time_ns()}")
-    with Rows(folder, columns, stated, resume=resume) as rows:
+    with Rows(folder, columns, stated, resume=resume, is_right=row_check(scenario, plan)) as rows:
         done = rows.done
         if any(run >= plan.count for run in done):
             raise CampaignError(f"{folder} holds {max(done) + 1} runs already, --runs asks for {plan.count}")

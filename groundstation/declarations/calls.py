@@ -20,8 +20,9 @@ def shortened(text: str, most: int = 80) -> str:
 
 
 def in_one_line(text: str) -> str:
-    """A text for a sentence: no line breaks, and values of thousands of characters cut."""
-    return shortened(" ".join(shortened(word, _LONGEST_WORD) for word in text.split()), _LONGEST_TEXT)
+    """A text for a sentence: no line breaks, no control characters, values of thousands of characters cut."""
+    line = shortened(" ".join(shortened(word, _LONGEST_WORD) for word in text.split()), _LONGEST_TEXT)
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in line)
 
 
 def described(error: BaseException) -> str:

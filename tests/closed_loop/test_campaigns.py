@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from groundstation.campaign.errors import CampaignError
+from groundstation.campaign.flying import died
+from groundstation.campaign.known_rows import row_check
 from groundstation.campaign.plan import Plan
 from groundstation.campaign.running import Means, run_campaign
 from groundstation.cli.main import call
@@ -203,6 +205,19 @@ def test_a_cluster_that_is_not_there_is_one_sentence(file, tmp_path, capsys):
     assert call(words) == 2
     assert "no cluster answers there" in capsys.readouterr().err
     assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("column", "cell"),
+    [("seed", "abc"), ("verdict", "great"), ("laboratory.alpha.mass_kg", "12"), ("alpha.gas_ns", "lots")],
+)
+def test_a_row_that_somebody_has_edited_is_flown_again(file, rows, tmp_path, column, cell):
+    plan = load(file)
+    is_right = row_check(plan, Plan(RUNS, SEED))
+    found = list(csv.DictReader(rows.decode().splitlines()))
+    assert all(map(is_right, found))
+    assert not is_right({**found[2], column: cell})
+    assert is_right(died(tuple(found[2]), Plan(RUNS, SEED), 2))
 
 
 def test_ctrl_c_while_workers_begin_is_one_sentence(file, tmp_path):

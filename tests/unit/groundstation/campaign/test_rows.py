@@ -159,6 +159,33 @@ def test_a_journal_of_noise_is_flown_again(tmp_path):
         assert rows.done == {0, 2}
 
 
+@pytest.mark.parametrize(
+    "line",
+    [json.dumps({**row(4), "verdict": None}), json.dumps({**row(4), "run": "9" * 5000}), "[" * 100_000,
+     json.dumps({**row(4), "run": 4})],
+    ids=["no text", "many digits", "deep", "number"],
+)  # fmt: skip
+def test_a_line_of_the_journal_that_nobody_wrote_is_flown_again(tmp_path, line):
+    with opened(tmp_path) as rows:
+        rows.add(0, row(0))
+    (tmp_path / WAITING).write_text(f"{line}\n")
+    with opened(tmp_path, resume=True) as rows:
+        assert rows.done == {0}
+
+
+def test_a_row_that_is_not_right_is_flown_again_and_the_others_stay(tmp_path):
+    with opened(tmp_path) as rows:
+        for run in range(4):
+            rows.add(run, row(run))
+    whole = (tmp_path / CSV).read_bytes()
+    (tmp_path / CSV).write_bytes(whole.replace(b"1,7,", b"1,8,"))
+    again = Rows(tmp_path, COLUMNS, IDENTITY, resume=True, is_right=lambda row: row["seed"] != "8")
+    with again as rows:
+        assert rows.done == {0, 2, 3}
+        rows.add(1, row(1))
+    assert (tmp_path / CSV).read_bytes() == whole
+
+
 def test_a_disk_that_is_full_is_one_sentence_and_the_rows_before_it_stay(tmp_path):
     def fill():
         with opened(tmp_path) as rows:
