@@ -83,6 +83,8 @@ def parse_rig(text: str, path: Path, files: RigFiles | None = None, tables: Tabl
         content = toml_of(text, path)
     except FileError as error:
         raise RigError(in_one_line(str(error))) from error
+    if "rig" in content:
+        raise RigError(f"{path}: is a scenario; expected a rig, such as its key 'rig' names")
     return build_rig(content, path, files, tables)
 
 

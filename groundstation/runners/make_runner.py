@@ -1,6 +1,7 @@
 """A lockstep run of a rig, made by one call: for examples, tests, scenarios, campaigns."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from numbers import Integral
 from types import MappingProxyType
 
 from pydantic import ValidationError
@@ -85,15 +86,14 @@ def seed_of(rig: Rig, seed: int | None) -> int:
     """The seed asked for, else the rig's, else ``DEFAULT_SEED``.
 
     Raises:
-        RigError: The rig's seed is no whole number from 0 up.
+        RigError: It is no whole number from 0 up.
     """
-    if seed is not None:
-        return seed
     table = rig.laboratory.table if rig.laboratory is not None else {}
-    found = table.get("seed", DEFAULT_SEED)
-    if not isinstance(found, int) or isinstance(found, bool) or found < 0:
-        raise RigError(f"laboratory.seed: expected a whole number from 0 up, found {found!r}")
-    return found
+    found = table.get("seed", DEFAULT_SEED) if seed is None else seed
+    if not isinstance(found, Integral) or isinstance(found, bool) or found < 0:
+        key = "laboratory.seed" if seed is None else "seed"
+        raise RigError(f"{key}: expected a whole number from 0 up, found {found!r}")
+    return int(found)
 
 
 def _named(way: Sequence[object], table: object) -> Iterator[str]:

@@ -1,6 +1,5 @@
 """A scenario as it was read: its file, its rig, and the same with other values."""
 
-import contextlib
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -78,6 +77,8 @@ class Scenario:
         """
         content = deepcopy(self.content)
         for key, value in changes.items():
+            if not isinstance(key, str):
+                raise ScenarioError(f"{self.path}: {key!r}: a key is a text, 'laboratory.alpha.mass_kg'")
             if is_of_scenario(key):
                 _set(content, key, value, self)
             else:
@@ -134,19 +135,11 @@ def made(content: dict[str, Any], path: Path, base: Rig | None = None) -> Scenar
     """
     file = parse_content(content, path)
     if base is None:
-        base = _base(path, path.parent / path_of(file.rig))
+        try:
+            base = load_rig(path.parent / path_of(file.rig))
+        except UsageError as error:
+            raise ScenarioError(f"{path}: rig: {error}") from error
     return Scenario(path, content, file, base, _compiled(file, path, base))
-
-
-def _base(path: Path, rig: Path) -> Rig:
-    try:
-        return load_rig(rig)
-    except UsageError as error:
-        reason = str(error)
-        with contextlib.suppress(UsageError):
-            if is_scenario(content_of(read_text(rig, WHAT), rig)):
-                reason = f"{rig} is a scenario itself: name the rig that flies it"
-        raise ScenarioError(f"{path}: rig: {reason}") from error
 
 
 def rig_text(rig: Rig) -> str:

@@ -172,9 +172,18 @@ def run(
         laws: By vehicle, a function or a controller in the place of the scenario's.
 
     Raises:
-        UsageError: The laboratory refuses what the scenario asks, or a law is for no vehicle of the rig.
+        UsageError: The laboratory refuses what the scenario asks, or a law is none, or for no vehicle of the
+            rig, or the seed is none.
+        TypeError: It is no scenario.
     """
-    for name in laws:
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"scenario.run takes what scenario.load returns, found {scenario!r:.80}")
+    for name, law in laws.items():
+        if not (callable(law) or hasattr(law, "update")):
+            raise ScenarioError(
+                f"{scenario.path}: laws: {name}: expected a controller or a function of state, goal, dt_s, "
+                f"found {law!r:.80}"
+            )
         if name not in scenario.rig.vehicles:
             raise ScenarioError(
                 f"{scenario.path}: laws: the rig has no vehicle {name!r} (it has: "

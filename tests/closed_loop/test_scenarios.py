@@ -233,6 +233,15 @@ def test_a_notebooks_mistakes_are_named(file):
     plan = scenario.load(file(SHORT)).vary({"duration_s": 0.5})
     with pytest.raises(UsageError, match="no vehicle 'gamma'"):
         scenario.run(plan, laws={"gamma": lambda state, goal, dt_s: (0.0, 0.0, 0.0)})
+    with pytest.raises(UsageError, match=r"laws: alpha: expected a controller or a function .*found 'go_to'"):
+        scenario.run(plan, laws={"alpha": "go_to"})
+    with pytest.raises(TypeError, match=r"takes what scenario\.load returns, found 'short\.toml'"):
+        scenario.run("short.toml")
+    with pytest.raises(UsageError, match="3: a key is a text"):
+        plan.vary({3: 4.0})
+    for seed in (-1, 1.5, "x", True):
+        with pytest.raises(UsageError, match=f"seed: expected a whole number from 0 up, found {seed!r}"):
+            scenario.run(plan, seed)
     flown = scenario.run(plan)
     assert repr(flown) == "<short: passed>"
     with pytest.raises(KeyError, match=r"'alpha.gas' .*alpha\.gas_ns"):

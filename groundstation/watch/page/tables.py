@@ -53,7 +53,8 @@ def _limit(outcome: LimitOutcome) -> list[Cell]:
     held = '<span class="good">held</span>' if outcome.held else '<span class="bad">failed</span>'
     whose = escape(", ".join(outcome.vehicles)) or "all"
     words = escape(" and ".join(bounds))
-    return [escape(outcome.what), whose, figure(outcome.value), words, held, figure(outcome.at_s)]
+    value = "never" if math.isinf(outcome.value) else figure(outcome.value)
+    return [escape(outcome.what), whose, value, words, held, figure(outcome.at_s)]
 
 
 def numbers(subject: Subject) -> str:

@@ -197,7 +197,7 @@ MISTAKES = {
     "no list": ('vehicles = ["alpha", "beta"]', 'vehicles = "all"', ["limits.0.vehicles: expected a list"]),
     "rig without a name": (RIG.as_posix(), "", [": rig: "]),
     "rig of a very long name": (RIG.as_posix(), "a" * 5000, [": rig: ", "aaa... cannot be read"]),
-    "rig that is the scenario": (RIG.as_posix(), "wrong.toml", [": rig: ", "is a scenario itself"]),
+    "rig that is the scenario": (RIG.as_posix(), "wrong.toml", [": rig: ", "is a scenario; expected a rig"]),
     "nothing to add to": ("{ normal = [11.0, 0.2] }", "{ add_normal = [11.0, 0.2] }",
                           ["dispersions.laboratory.alpha.mass_kg", "add"]),
 }  # fmt: skip

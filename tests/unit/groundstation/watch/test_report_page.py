@@ -37,6 +37,7 @@ VOID = {"meta", "br", "hr", "img", "input", "link"}
 LIMITS = (
     LimitOutcome("position_error_rms_mm", ("alpha",), 12.34, 8.0, None, held=False, at_s=4.0),
     LimitOutcome("least_distance_mm", ("alpha", "beta"), 312.0, None, 200.0, held=True, at_s=1.5),
+    LimitOutcome("settling_s", ("alpha",), float("inf"), 50.0, None, held=False, at_s=9.0),
     LimitOutcome("gas_ns", (), float("nan"), 50.0, None, held=False, at_s=float("nan")),
 )
 VERDICT = Verdict(
@@ -158,6 +159,7 @@ def test_verdict_and_every_limit_stand_in_the_page(judged):
     text = Page(page).text
     for words in ("a rehearsal", "failed", VERDICT.reason, "below 8", "above 200", "12.34", "alpha, beta"):
         assert words in text
+    assert "never" in text, "what never came"
     for outcome in LIMITS:
         assert outcome.what in text
 
@@ -170,6 +172,7 @@ def test_the_numbers_have_the_keys_that_programs_read(judged):
          "at_s": 4.0},
         {"what": "least_distance_mm", "vehicles": ["alpha", "beta"], "value": 312.0, "above": 200.0,
          "held": True, "at_s": 1.5},
+        {"what": "settling_s", "vehicle": "alpha", "value": None, "below": 50.0, "held": False, "at_s": 9.0},
         {"what": "gas_ns", "vehicles": [], "value": None, "below": 50.0, "held": False, "at_s": None},
     ]  # fmt: skip
     assert numbers["seed"] == 1
