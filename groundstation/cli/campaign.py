@@ -49,6 +49,8 @@ def campaign(
     scenario = load(file)
     plan = Plan(runs, seed, parse_sweep(sweep) if sweep else None)
     if only is not None:
+        if resume or scheduler:
+            raise CampaignError("--only flies one run here and alone: without --resume and --scheduler")
         _fly_one(file, plan, out, only)
         return
     means = Means(workers or os.cpu_count() or 1, scheduler)

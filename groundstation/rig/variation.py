@@ -48,10 +48,10 @@ def _set(content: dict[str, Any], key: str, value: object) -> None:
         return
     if not isinstance(found, list):
         raise RigError(f"{'.'.join(way)}: is no table of the rig")
-    place = place_in(found, last)
-    if place is None:
+    at = place_in(found, last)
+    if at is None:
         raise RigError(f"{'.'.join(way)}: is a list of {len(found)}, numbered from 0")
-    found[place] = value
+    found[at] = value
 
 
 def place_in(entries: Sequence[object], name: str) -> int | None:

@@ -128,6 +128,7 @@ def check_varied(scenario: Scenario, changes: Mapping[str, object], what: str) -
 
 def _refused(scenario: Scenario, what: str, error: UsageError) -> ScenarioError:
     reason = str(error).removeprefix(f"{scenario.path}: ").removeprefix("changes.")
+    reason = reason.removeprefix(f"{what.removeprefix('dispersions.')}: ")
     return ScenarioError(f"{scenario.path}: {what}: {reason}")
 
 

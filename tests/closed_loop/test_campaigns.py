@@ -291,6 +291,14 @@ def test_a_sweep_that_cannot_be_flown_is_one_sentence(file, tmp_path, capsys, sw
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.parametrize("option", [["--resume"], ["--scheduler", "tcp://127.0.0.1:9"]])
+def test_one_run_is_flown_here_and_alone(file, tmp_path, capsys, option):
+    asked = ["--runs", "2", "--only", "1", "--out", str(tmp_path / "c"), *option]
+    assert call(["campaign", str(file), *asked]) == 2
+    assert "--only flies one run here and alone" in capsys.readouterr().err
+    assert not (tmp_path / "c").exists()
+
+
 def test_a_sweep_gives_its_key_a_column(file, tmp_path):
     words = ["campaign", str(file), "--runs", "1", "--out", str(tmp_path / "c"), "--workers", "1"]
     assert call([*words, "--sweep", "laboratory.beta.mass_kg=10:12:2"]) == 0

@@ -181,7 +181,7 @@ MISTAKES = {
     "dispersion of what a start stands in place of": (
         '"laboratory.alpha.mass_kg" = { normal = [11.0, 0.2] }',
         '"laboratory.alpha.start_heading_deg" = { normal = [0.0, 2.0] }',
-        ["dispersions.laboratory.alpha.start_heading_deg", "vehicles.alpha.start stands in its place"],
+        ["dispersions.laboratory.alpha.start_heading_deg: vehicles.alpha.start stands in its place"],
     ),
     "two spellings of one dispersion": (
         '{ normal = [11.0, 0.2] }',
