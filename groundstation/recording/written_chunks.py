@@ -70,7 +70,7 @@ class WrittenChunks:
             position += _BATCH.size
             yield from self._unpacked(decompress(self._packed[position : position + length], plain))
             position += length
-        yield from self._unpacked(self._open)
+        yield from self._unpacked(bytes(self._open))
 
     def _unpacked(self, batch: bytes) -> Iterator[bytes]:
         position = 0
