@@ -19,6 +19,7 @@ from groundstation.declarations.errors import UsageError
 from groundstation.files.amounts import UNITLESS
 from groundstation.files.png import png_of
 from groundstation.files.writing import Content, check_targets, write_files
+from groundstation.fusion.disagreement import likely_cause, why_nothing
 from groundstation.fusion.error_state_filter import ErrorStateFilter
 from groundstation.fusion.estimate_figure import draw_estimate
 from groundstation.fusion.estimator import Estimator, FixOutcome, PlanarState
@@ -117,6 +118,8 @@ def run(
     estimator = _estimator(data.noise, method, settings, table_map, smooth=smooth)
     with progress_line() as progress:
         states, accounts = estimate(data, estimator, partial(progress, "estimating"))
+    if not any(states):
+        raise UsageError(f"{folder}: no estimate comes of it: {why_nothing(accounts)}.")
     if isinstance(estimator, OfflineSmoother):
         later = iter(estimator.states())
         states = [next(later) if math.isfinite(t) else None for t in data.imu[:, 0].tolist()]
@@ -127,9 +130,11 @@ def run(
     if plot is not None:
         contents[plot] = png_of(draw_estimate(data, states, accounts))
     write_files(contents)
-    for note in data.notes:
+    spans = lost_spans(data, states)
+    cause = likely_cause(data, spans) if spans else None
+    for note in (*data.notes, *([] if cause is None else [cause])):
         sys.stderr.write(f"{note}.\n")
-    _summarise(data, states, accounts, estimator)
+    _summarise(states, accounts, estimator, spans)
 
 
 def _estimator(
@@ -165,11 +170,14 @@ def _fix_lines(accounts: list[FixOutcome]) -> Iterator[str]:
 
 
 def _summarise(
-    data: FlightData, states: list[PlanarState | None], accounts: list[FixOutcome], estimator: Estimator
+    states: list[PlanarState | None],
+    accounts: list[FixOutcome],
+    estimator: Estimator,
+    spans: list[tuple[float, float]],
 ) -> None:
     used = sum(account.used for account in accounts)
     print(f"{len(states)} packets, {len(accounts)} fixes, {used} used.")
     for name, count in sorted(estimator.counters.by_name.items()):
         print(f"  {name.replace('_', ' ')}: {count}")
-    for start_s, stop_s in lost_spans(data, states):
+    for start_s, stop_s in spans:
         print(f"  the estimate was lost from {start_s:.2f} to {stop_s:.2f} s")

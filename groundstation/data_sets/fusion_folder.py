@@ -21,7 +21,9 @@ from groundstation.data_sets.stamp_words import (
 )
 from groundstation.data_sets.value_words import (
     complaint_about_places,
+    complaint_about_readings,
     complaint_about_temperatures,
+    notes_of_still_channels,
     without_wild_temperatures,
 )
 from groundstation.files.errors import FileError
@@ -62,7 +64,9 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     _refuse(path, complaint_about_units(imu[:, 0], period_s))
     _refuse(path, complaint_about_bunches(imu, period_s))
     _refuse(path, complaint_about_temperatures(imu[:, 4]))
+    _refuse(path, complaint_about_readings(imu, noise))
     imu[:, 4], notes = without_wild_temperatures(imu[:, 4], table.lines.tolist(), path.name)
+    notes += notes_of_still_channels(imu, path.name)
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers

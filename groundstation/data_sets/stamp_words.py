@@ -8,7 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.fusion.stamp_screen import BEHIND, FAR, LONG_GAP_S, NOT_FINITE, Screened, spacing_of
+from groundstation.fusion.flight_data import EARLY_S
+from groundstation.fusion.stamp_screen import (
+    BEHIND,
+    FAR,
+    LONG_GAP_S,
+    NOT_FINITE,
+    REPEATED,
+    Screened,
+    spacing_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -23,11 +32,15 @@ MOST_EQUAL = 0.1
 MOST_FALLING = 0.1
 LATEST_START = 1.0
 """The record begins before this many of its durations have passed."""
+MOST_EARLY = 0.5
+SPANNED = 0.05
+"""Share of the record that fixes span at least: by it other units are told from another clock."""
 NAMED = 3
 ASIDE_WORDS = {
     NOT_FINITE: "is no number",
     FAR: "is far from the rows around it",
     BEHIND: "is not after the one before",
+    REPEATED: "and all readings are those of an earlier line",
 }
 
 
@@ -129,6 +142,12 @@ def complaint_about_fixes(stars: Array, screened_s: Array) -> str | None:
         screened_s: (n,) of the packets, after the screen.
     """
     t = screened_s[np.isfinite(screened_s)]
+    early = stars[:, 1] < stars[:, 0] - EARLY_S
+    if early.sum() > MOST_EARLY * len(stars):
+        return (
+            f"t_arrival_s is before t_exposure_s in {early.sum()} of {len(stars)} rows: a fix arrives after "
+            "its exposure; are the columns interchanged"
+        )
     for column, name in enumerate(("t_exposure_s", "t_arrival_s")):
         given = stars[np.isfinite(stars[:, column]), column]
         if len(given) < 2 or ((given > t[0] - 5.0) & (given < t[-1] + 5.0)).any():
@@ -138,9 +157,10 @@ def complaint_about_fixes(stars: Array, screened_s: Array) -> str | None:
             f"{given.min():.10g} to {given.max():.10g}"
         )
         for factor, unit in UNITS.items():
-            if t[0] - 5.0 < float(np.median(given)) / factor < t[-1] + 5.0:
+            span_s = float(np.ptp(given)) / factor
+            if t[0] - 5.0 < float(np.median(given)) / factor < t[-1] + 5.0 and span_s > SPANNED * np.ptp(t):
                 return f"{text}; in {unit}? Seconds of the packets' clock are expected"
-        return f"{text}; seconds of the packets' clock are expected"
+        return f"{text}; by another clock? Seconds of the packets' clock are expected"
     return None
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.fusion.noise import NoiseModel
 
 Array = NDArray[np.float64]
 
@@ -14,6 +17,23 @@ WIDEST_TABLE_M = 50.0
 CHIP_C = (-60.0, 150.0)
 """What a sensor can report of itself, with room."""
 NAMED = 3
+LEAST_PACKETS = 20
+TINY = 1e-12
+SCATTER_TOLERANCE = 1.8
+"""Times by which a healthy sensor's scatter may differ from what is stated of it."""
+STANDARD_GRAVITY_M_S2 = 9.80665
+_ACC_UNITS = {1e3 / STANDARD_GRAVITY_M_S2: "mg", 1e3: "mm/s^2"}
+CHANNELS: Mapping[int, tuple[str, str, Mapping[float, str]]] = {
+    1: ("omega_rad_s", "Radians a second", {math.degrees(1.0): "deg/s", math.degrees(3600.0): "deg/h"}),
+    2: ("ax_m_s2", "Metres a second squared", _ACC_UNITS),
+    3: ("ay_m_s2", "Metres a second squared", _ACC_UNITS),
+}
+"""By column of the packets: name, unit, and other units with how many of them are one."""
+DENSITY_OF: Mapping[int, Callable[[NoiseModel], float]] = {
+    1: lambda noise: noise.gyro_density_rad_s_rthz,
+    2: lambda noise: noise.acc_density_m_s2_rthz,
+    3: lambda noise: noise.acc_density_m_s2_rthz,
+}
 
 
 def complaint_about_places(stars: Array) -> str | None:
@@ -30,6 +50,51 @@ def complaint_about_places(stars: Array) -> str | None:
         f"x_m and y_m are {np.median(places):.4g} in the middle, farther than any table reaches: in mm or "
         "cm? Metres are expected"
     )
+
+
+def complaint_about_readings(imu: Array, noise: NoiseModel) -> str | None:
+    """Return why rates or accelerations cannot be in SI units; None if they can.
+
+    How far readings scatter from packet to packet is known, whatever the vehicle does: in other units it is
+    the wrong number of times that.
+
+    Args:
+        imu: (n, 5) stamp, rate, ax, ay, temperature, as given.
+        noise: As the folder states it.
+    """
+    for column, (name, expected, units) in CHANNELS.items():
+        times = _scatter(imu[:, column]) / (DENSITY_OF[column](noise) / math.sqrt(noise.packet_period_s))
+        for factor, unit in units.items():
+            if abs(math.log(max(times, TINY) / factor)) < math.log(SCATTER_TOLERANCE):
+                return (
+                    f"{name} scatters {times:.3g} times as much from packet to packet as the noise in the "
+                    f"known block of meta.json: in {unit}? {expected} are expected"
+                )
+    return None
+
+
+def notes_of_still_channels(imu: Array, name: str) -> tuple[str, ...]:
+    """Return a sentence for each channel that has one value in all packets: it measures nothing.
+
+    Args:
+        imu: (n, 5) stamp, rate, ax, ay, temperature, as given.
+        name: Of the file.
+    """
+    if len(imu) < LEAST_PACKETS:
+        return ()
+    return tuple(
+        f"{name}: {channel} is {imu[0, column]:.6g} in all {len(imu)} packets: that channel measures nothing"
+        for column, (channel, _, _) in CHANNELS.items()
+        if (imu[:, column] == imu[0, column]).all()
+    )
+
+
+def _scatter(readings: Array) -> float:
+    """Standard deviation of the readings by how they differ from packet to packet, robust against motion."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.abs(np.diff(readings))
+    steps = steps[np.isfinite(steps)]
+    return float(np.median(steps)) * 1.4826 / math.sqrt(2.0) if len(steps) >= LEAST_PACKETS else math.nan
 
 
 def complaint_about_temperatures(temperature_c: Array) -> str | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.fusion.estimator import Estimator, Fix, FixOutcome, ImuPacket, PlanarState
 from groundstation.fusion.noise import NoiseModel
-from groundstation.fusion.stamp_screen import LARGEST_S, Screened, screen_stamps, set_back_at
+from groundstation.fusion.stamp_screen import LARGEST_S, Screened, repeated_rows, screen_stamps, set_back_at
 from groundstation.fusion.stamp_ticks import StampTicks
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ class FlightData:
         """
         if self.given_s is not None:
             return self
-        found = screen_stamps(self.imu[:, 0], self.noise.packet_period_s)
+        found = screen_stamps(self.imu[:, 0], self.noise.packet_period_s, repeated_rows(self.imu))
         imu = self.imu.copy()
         imu[:, 0] = found.stamp_s
         odd = {reason: len(rows) for reason, rows in found.aside.items()}

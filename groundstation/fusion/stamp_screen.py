@@ -33,6 +33,7 @@ NOT_FINITE = "packet_stamp_not_finite"
 BEHIND = "packet_stamp_not_after_the_last"
 FAR = "packet_stamp_far_from_its_neighbours"
 SET_BACK = "clock_jumped_back"
+REPEATED = "packet_repeated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,18 +63,33 @@ def spacing_of(stamp_s: Array) -> float:
     return float(np.median(steps)) if len(steps) else float("nan")
 
 
-def screen_stamps(stamp_s: Array, period_s: float) -> Screened:
+def repeated_rows(table: Array) -> NDArray[np.bool_]:
+    """Return which rows (n,) are equal to an earlier one in every column: pasted twice, not measured twice.
+
+    Args:
+        table: (n, k), stamps and readings.
+    """
+    _, first = np.unique(table, axis=0, return_index=True, equal_nan=False)
+    again = np.ones(len(table), dtype=np.bool_)
+    again[first] = False
+    return again
+
+
+def screen_stamps(stamp_s: Array, period_s: float, again: NDArray[np.bool_] | None = None) -> Screened:
     """Judge the stamps of a table in the order of its rows.
 
     Args:
         stamp_s: (n,) as given, s; anything.
         period_s: Of the rows, nominal.
+        again: (n,) rows that repeat an earlier one: nothing follows from their stamps.
     """
     aside: dict[str, NDArray[np.intp]] = {}
+    again = np.zeros(len(stamp_s), dtype=np.bool_) if again is None else again
+    aside[REPEATED] = np.flatnonzero(again & np.isfinite(stamp_s))
     with np.errstate(invalid="ignore"):
-        rows = np.flatnonzero(np.abs(stamp_s) < LARGEST_S)
+        rows = np.flatnonzero((np.abs(stamp_s) < LARGEST_S) & ~again)
         aside[NOT_FINITE] = np.flatnonzero(~np.isfinite(stamp_s))
-        aside[FAR] = np.flatnonzero(np.isfinite(stamp_s) & (np.abs(stamp_s) >= LARGEST_S))
+        aside[FAR] = np.flatnonzero(np.isfinite(stamp_s) & (np.abs(stamp_s) >= LARGEST_S) & ~again)
     out = np.full(len(stamp_s), np.nan)
     is_out = _out_and_back(stamp_s[rows], period_s)
     aside[FAR] = np.concatenate([aside[FAR], rows[is_out]])

@@ -1,9 +1,49 @@
-"""A noise model and a covariance for the fusion tests."""
+"""A noise model, a covariance and data folders for the fusion tests."""
+
+import shutil
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from groundstation.cli.fusion import app
 from groundstation.fusion.noise import NoiseModel, packet_density
+
+IMU = "t_s,omega_rad_s,ax_m_s2,ay_m_s2,temperature_C"
+STARS = "t_exposure_s,t_arrival_s,x_m,y_m,heading_rad"
+
+
+class Flight:
+    """A data folder as arrays; truth by the rows' true times."""
+
+    def __init__(self, source, folder):
+        shutil.copytree(source, folder)
+        self.folder = folder
+        self.imu = np.loadtxt(folder / "imu.csv", delimiter=",", skiprows=1)
+        self.stars = np.loadtxt(folder / "stars.csv", delimiter=",", skiprows=1)
+        self.truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
+        self.true_s = self.imu[:, 0].copy()
+
+    def run(self, *words):
+        for name, header, rows in (("imu", IMU, self.imu), ("stars", STARS, self.stars)):
+            np.savetxt(self.folder / f"{name}.csv", rows, "%.9f", ",", header=header, comments="")
+        out = self.folder / "estimate.csv"
+        result = CliRunner().invoke(app, ["run", str(self.folder), "--out", str(out), *words])
+        if result.exception is not None:
+            raise result.exception
+        self.output = result.output
+        rows = np.genfromtxt(out, delimiter=",", skip_header=1)
+        want = [np.interp(self.true_s, self.truth["t_s"], self.truth[n]) for n in ("x_m", "y_m")]
+        self.error_m = np.hypot(rows[:, 1] - want[0], rows[:, 2] - want[1])
+        self.sigma_m = np.hypot(rows[:, 10], rows[:, 11])
+        self.heading_sigma_rad = rows[:, 12]
+        return self
+
+
+@pytest.fixture
+def make_flight(tmp_path):
+    """Copies a data folder for tests that change it."""
+    return lambda source: Flight(source, tmp_path / "data")
 
 
 @pytest.fixture

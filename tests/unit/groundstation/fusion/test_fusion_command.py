@@ -141,7 +141,8 @@ def test_shuffled_and_broken_rows_are_survived_and_counted(folder, tmp_path):
     (folder / "imu.csv").write_text("".join(lines))
     result = run(folder, "--out", tmp_path / "e.csv")
     assert result.exit_code == 0
-    assert "packet stamp not after the last: 2" in result.output
+    assert "packet stamp not after the last: 1" in result.output
+    assert "packet repeated: 1" in result.output
     assert "packet wild" in result.output
     assert len((tmp_path / "e.csv").read_text().splitlines()) == len(lines)
 
@@ -173,7 +174,7 @@ def nan_stamp(lines):
     ("spoil", "counter"),
     [
         (jump_back, "clock jumped back: 1"),
-        (twice, "packet stamp not after the last: 10"),
+        (twice, "packet repeated: 10"),
         (gap, "packet hole"),
         (nan_readings, "packet wild"),
         (nan_stamp, "packet stamp not finite: 1"),

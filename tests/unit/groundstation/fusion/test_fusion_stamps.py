@@ -1,13 +1,10 @@
 """`groundstation fusion run` on tables whose stamps are wrong: set aside by line, crossed, or refused."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from groundstation.cli.fusion import app
 from groundstation.data_sets.fusion_folder import read_folder
 from groundstation.files.errors import FileError
 from groundstation.fusion.error_state_filter import ErrorStateFilter
@@ -15,40 +12,11 @@ from groundstation.fusion.estimator import Fix, ImuPacket
 
 ROW = 2000
 """In flight."""
-IMU = "t_s,omega_rad_s,ax_m_s2,ay_m_s2,temperature_C"
-STARS = "t_exposure_s,t_arrival_s,x_m,y_m,heading_rad"
-
-
-class Flight:
-    """A data folder as arrays; truth by the rows' true times."""
-
-    def __init__(self, source, folder):
-        shutil.copytree(source, folder)
-        self.folder = folder
-        self.imu = np.loadtxt(folder / "imu.csv", delimiter=",", skiprows=1)
-        self.stars = np.loadtxt(folder / "stars.csv", delimiter=",", skiprows=1)
-        self.truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
-        self.true_s = self.imu[:, 0].copy()
-
-    def run(self, *words):
-        for name, header, rows in (("imu", IMU, self.imu), ("stars", STARS, self.stars)):
-            np.savetxt(self.folder / f"{name}.csv", rows, "%.9f", ",", header=header, comments="")
-        out = self.folder / "estimate.csv"
-        result = CliRunner().invoke(app, ["run", str(self.folder), "--out", str(out), *words])
-        if result.exception is not None:
-            raise result.exception
-        self.output = result.output
-        rows = np.genfromtxt(out, delimiter=",", skip_header=1)
-        want = [np.interp(self.true_s, self.truth["t_s"], self.truth[n]) for n in ("x_m", "y_m")]
-        self.error_m = np.hypot(rows[:, 1] - want[0], rows[:, 2] - want[1])
-        self.sigma_m = np.hypot(rows[:, 10], rows[:, 11])
-        self.heading_sigma_rad = rows[:, 12]
-        return self
 
 
 @pytest.fixture
-def flight(make_folder, tmp_path):
-    return Flight(make_folder(scenario="station", seed=7, duration_s=40.0), tmp_path / "data")
+def flight(make_folder, make_flight):
+    return make_flight(make_folder(scenario="station", seed=7, duration_s=40.0))
 
 
 @pytest.mark.parametrize("rows", [[ROW], [ROW, ROW + 1], [0], [-1]])
