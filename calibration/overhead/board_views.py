@@ -43,7 +43,7 @@ def read_board_views(folder: Path, printed: Board) -> tuple[list[BoardView], Ove
                 "(a marker must cover 20 pixels)."
             )
         board_m, pixel = (np.asarray(values, dtype=np.float64) for values in found)
-        views.append(BoardView(board_m, pixel, *places[path.stem]))
+        views.append(BoardView(board_m, pixel, *places[path.stem], path.stem))
     return views, lens
 
 

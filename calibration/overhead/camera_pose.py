@@ -2,7 +2,8 @@
 
 The lens is known. Each placement of the board is known as well as a tape tells it: its place and heading are
 unknowns with that prior, so that the reported sigmas hold the tape's error. One placement is enough; several
-show, by how much the tape had to be bent, whether the numbers are right.
+show, by how much the tape had to be bent, whether the numbers are right. Pictures of which the tape says the
+same share their unknowns: it was measured once.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,13 @@ Array = NDArray[np.float64]
 POSE = ("x_m", "y_m", "z_m", "yaw_rad", "tilt_x_rad", "tilt_y_rad")
 CORNER_SIGMA_PX = 0.1
 """Of one corner, where the residuals say nothing smaller is true."""
+MOST_TAPE_SIGMAS = 3.0
+"""A tape that is this many times worse than stated, over all places, contradicts the pictures."""
+MOST_CORNER_PX = 2.0
+"""Corners that are left further than this are none of a flat board seen through this lens."""
 _MIN_CORNERS = 8
+_MOST_STEPS = 30
+"""Views that agree need a few; those that contradict each other need not be fitted to the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +41,7 @@ class BoardView:
         x_m: Board's origin (upper left corner of its print) in the table.
         y_m: Likewise.
         heading_rad: From table +x to the board's x.
+        name: Of the picture, for messages.
     """
 
     board_m: Array
@@ -41,6 +49,12 @@ class BoardView:
     x_m: float
     y_m: float
     heading_rad: float
+    name: str = ""
+
+    @property
+    def tape(self) -> tuple[float, float, float]:
+        """What was measured."""
+        return self.x_m, self.y_m, self.heading_rad
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +67,7 @@ class OverheadPose:
         residual_px: Corner minus model, (n, 2).
         tape_m: By how much each placement had to be moved (k, 2), m.
         tape_rad: And turned (k,).
+        tape_sigmas: How many times worse the tape is than stated, by the pictures; 0 with one placement.
     """
 
     camera: OverheadCamera
@@ -60,6 +75,17 @@ class OverheadPose:
     residual_px: Array
     tape_m: Array
     tape_rad: Array
+    tape_sigmas: float
+
+    @property
+    def is_credible(self) -> bool:
+        """Whether tape and pictures say the same."""
+        return self.tape_sigmas <= MOST_TAPE_SIGMAS and self.corner_rms_px <= MOST_CORNER_PX
+
+    @property
+    def corner_rms_px(self) -> float:
+        """Root of the mean square of what is left of a corner's coordinates."""
+        return float(np.sqrt((self.residual_px**2).mean()))
 
 
 def calibrate_overhead_pose(
@@ -79,30 +105,39 @@ def calibrate_overhead_pose(
         board_height_m: Thickness of the board.
 
     Raises:
-        CalibrationRefusedError: No view, or one with too few corners.
+        CalibrationRefusedError: No view, one with too few corners, or views that no camera over the table has.
     """
     if not views:
         raise CalibrationRefusedError("the board was found in no picture")
     if min(len(view.pixel) for view in views) < _MIN_CORNERS:
         raise CalibrationRefusedError(f"a picture shows fewer than {_MIN_CORNERS} corners of the board")
-    priors = np.tile((tape_sigma_m, tape_sigma_m, tape_sigma_rad), len(views))
+    places = list(dict.fromkeys(view.tape for view in views))
+    place = [places.index(view.tape) for view in views]
+    priors = np.tile((tape_sigma_m, tape_sigma_m, tape_sigma_rad), len(places))
 
     def misfit(x: Array) -> Array:
-        return np.concatenate((_corner_misfit(x, views, lens, board_height_m).ravel(), x[6:] / priors))
+        corners = _corner_misfit(x, views, place, lens, board_height_m)
+        return np.concatenate((corners.ravel(), x[6:] / priors))
 
-    start = np.concatenate((_first_guess(views[0], lens, board_height_m), np.zeros(3 * len(views))))
-    found = least_squares(misfit, start, x_scale=np.concatenate((np.full(6, 0.01), priors)))
-    residual_px = _corner_misfit(found.x, views, lens, board_height_m) * CORNER_SIGMA_PX
-    jacobian = np.asarray(found.jac, dtype=np.float64)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    excess = max(1.0, float((residual_px**2).mean()) / CORNER_SIGMA_PX**2)
+    start = np.concatenate((_first_guess(views[0], lens, board_height_m), np.zeros(len(priors))))
+    try:
+        scale = np.concatenate((np.full(6, 0.01), priors))
+        found = least_squares(misfit, start, x_scale=scale, max_nfev=_MOST_STEPS)
+        covariance = np.linalg.inv(found.jac.T @ found.jac)
+    except ValueError as error:  # LinAlgError is one, too
+        raise CalibrationRefusedError(f"no place of the camera fits the pictures ({error})") from error
+    residual_px = _corner_misfit(found.x, views, place, lens, board_height_m) * CORNER_SIGMA_PX
     tape = found.x[6:].reshape(-1, 3)
+    freedom = 3 * (len(places) - 1)  # as many as the camera's place and yaw take
+    tape_sigmas = float(np.sqrt(((found.x[6:] / priors) ** 2).sum() / freedom)) if freedom else 0.0
+    excess = max(1.0, float(np.sqrt((residual_px**2).mean())) / CORNER_SIGMA_PX, tape_sigmas)
     return OverheadPose(
         _camera(lens, found.x),
-        np.sqrt(np.diag(covariance)[:6] * excess),
+        np.sqrt(np.diag(covariance)[:6]) * excess,
         residual_px,
         tape[:, :2],
         tape[:, 2],
+        tape_sigmas,
     )
 
 
@@ -122,10 +157,12 @@ def _on_table(view: BoardView, shift: Array, height_m: float) -> Array:
     return np.stack((x, y, np.full(len(x), height_m)), axis=1)
 
 
-def _corner_misfit(x: Array, views: Sequence[BoardView], lens: OverheadCamera, height_m: float) -> Array:
+def _corner_misfit(
+    x: Array, views: Sequence[BoardView], place: Sequence[int], lens: OverheadCamera, height_m: float
+) -> Array:
     camera = _camera(lens, x)
     out = []
-    for number, view in enumerate(views):
+    for number, view in zip(place, views, strict=True):
         corners = _on_table(view, x[6 + 3 * number : 9 + 3 * number], height_m)
         seen = (corners - camera.position_table_m) @ camera.table_from_camera()
         pixel, _ = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), _matrix(lens), np.array(lens.distortion))
