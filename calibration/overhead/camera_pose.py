@@ -123,7 +123,8 @@ def calibrate_overhead_pose(
     try:
         scale = np.concatenate((np.full(6, 0.01), priors))
         found = least_squares(misfit, start, x_scale=scale, max_nfev=_MOST_STEPS)
-        covariance = np.linalg.inv(found.jac.T @ found.jac)
+        jacobian = np.asarray(found.jac, dtype=np.float64)
+        covariance = np.linalg.inv(jacobian.T @ jacobian)
     except ValueError as error:  # LinAlgError is one, too
         raise CalibrationRefusedError(f"no place of the camera fits the pictures ({error})") from error
     residual_px = _corner_misfit(found.x, views, place, lens, board_height_m) * CORNER_SIGMA_PX
