@@ -100,6 +100,9 @@ def parse_table(
             is no number or too large, or one that appears twice.
     """
     text, doubt = _decoded(data, path)
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise FileError(f"{path}: line {line} holds a zero byte: damaged, or no text; save it as CSV UTF-8.")
     try:
         table = _parsed(text, path, numbers, words, optional, unique, is_finite=is_finite)
     except FileError:

@@ -16,7 +16,24 @@ _MARKS = (  # UTF-32 first: its mark begins with that of UTF-16
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_WORKBOOKS = {b"PK\x03\x04": "a workbook (.xlsx, .ods)", b"\xd0\xcf\x11\xe0": "a workbook (.xls)"}
+_UNPACK, _EXPORT = "unpack it", "save what it holds as text (a table as CSV UTF-8)"
+_NO_TEXT = {
+    b"PK\x03\x04": ("a workbook (.xlsx, .ods)", "save it as CSV UTF-8, or unpack it if it is an archive"),
+    b"PK\x05\x06": ("an empty archive (.zip)", "make it again"),
+    b"\xd0\xcf\x11\xe0": ("a workbook (.xls)", "save it as CSV UTF-8"),
+    b"\x1f\x8b": ("compressed (.gz)", _UNPACK),
+    b"BZh": ("compressed (.bz2)", _UNPACK),
+    b"\xfd7zXZ\x00": ("compressed (.xz)", _UNPACK),
+    b"\x28\xb5\x2f\xfd": ("compressed (.zst)", _UNPACK),
+    b"7z\xbc\xaf\x27\x1c": ("compressed (.7z)", _UNPACK),
+    b"\x89PNG": ("a picture (.png)", _EXPORT),
+    b"\xff\xd8\xff": ("a picture (.jpg)", _EXPORT),
+    b"%PDF-": ("a document (.pdf)", _EXPORT),
+    b"\x89HDF": ("HDF5 (.h5, .mat)", _EXPORT),
+    b"\x93NUMPY": ("an array of NumPy (.npy)", _EXPORT),
+    b"PAR1": ("a table of Parquet", _EXPORT),
+    b"\x89MCAP": ("a recording (.mcap)", "give it where a recording is expected"),
+}
 _LOOKED_AT = 4096  # of bytes, to tell UTF-16 without a mark
 
 
@@ -42,6 +59,8 @@ def read_bytes(path: Path) -> bytes:
     try:
         with open_file(path) as file:
             return file.read()
+    except IsADirectoryError as error:
+        raise FileError(f"{path}: is a folder, expected a file; name one in it.") from error
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error}).") from error
     except ValueError as error:  # a NUL in the name
@@ -69,15 +88,17 @@ def text_of(data: bytes, path: Path) -> str:
     mark, encoding = next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), (b"", ""))
     if not encoding:
         encoding = _unmarked(data[:_LOOKED_AT])
-    for head, what in _WORKBOOKS.items():
+    for head, (what, advice) in _NO_TEXT.items():
         if data.startswith(head):
-            raise FileError(f"{path}: is {what} and no text; save it as CSV.")
+            raise FileError(f"{path}: is {what} and no text; {advice}.")
     try:
         text = data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         name = encoding[: encoding.index("-", 4)] if encoding.count("-") > 1 else encoding
-        raise FileError(f"{path}: is not a text file (line {line} is no {name.upper()}).") from error
+        raise FileError(
+            f"{path}: is not a text file (line {line} is no {name.upper()}); save it as UTF-8."
+        ) from error
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

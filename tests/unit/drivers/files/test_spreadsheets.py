@@ -1,11 +1,14 @@
 """Tables as spreadsheets and people leave them: read as they are meant, or refused by line and column."""
 
+import bz2
+import gzip
+import lzma
 from pathlib import Path
 
 import pytest
 
 from drivers.files.errors import FileError
-from drivers.files.number_tables import parse_table
+from drivers.files.number_tables import load_table, parse_table
 
 PATH = Path("table.csv")
 ROWS = [("Süd", "1.5", "2"), ("b", "-0.25", "3e-1")]
@@ -46,6 +49,40 @@ def test_what_a_spreadsheet_exports_is_read(what):
     assert found.numbers.tolist() == [[1.5, 2.0], [-0.25, 0.3]]
     assert found.words["id"] == ["Süd", "b"]
     assert parse_table(data, PATH, ("x_m", "y_m")).numbers.tolist() == found.numbers.tolist()
+
+
+NO_TEXT = {
+    "a packed table": (gzip.compress(b"id,x_m,y_m\n0,1,2\n"), "is compressed (.gz) and no text; unpack it"),
+    "a table packed by bzip2": (bz2.compress(b"id,x_m\n"), "is compressed (.bz2) and no text; unpack it"),
+    "a table packed by xz": (lzma.compress(b"id,x_m\n"), "is compressed (.xz) and no text; unpack it"),
+    "an empty archive": (b"PK\x05\x06" + bytes(18), "is an empty archive (.zip) and no text"),
+    "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(40), "is a picture (.png) and no text; save what it holds"),
+    "a document": (b"%PDF-1.4\n", "is a document (.pdf) and no text; save what it holds as text"),
+    "a recording": (b"\x89MCAP0\r\n" + bytes(40), "is a recording (.mcap) and no text"),
+    "bytes of any kind": (bytes(range(250, 0, -1)), "line 1 is no UTF-8); save it as UTF-8"),
+    "half a character": ("id,x_m\n".encode("utf-16")[:-1], "is no UTF-16); save it as UTF-8"),
+    "a zero byte in a number": (b"id,x_m,y_m\n0,1\x005,2\n", "line 2 holds a zero byte: damaged, or no text"),
+    "a zero byte in a word": (b"id,x_m,y_m\na\x00b,1,2\n", "line 2 holds a zero byte"),
+    "a zero byte in the header": (b"i\x00d,x_m,y_m\n0,1,2\n", "line 1 holds a zero byte"),
+    "an end that was not written": (
+        b"id,x_m,y_m\n0,1,2\n" + bytes(512),
+        "line 3 holds a zero byte: damaged, or no text; save it as CSV UTF-8",
+    ),
+}
+
+
+@pytest.mark.parametrize("words", [(), ("id",)])
+@pytest.mark.parametrize("what", NO_TEXT)
+def test_what_is_no_text_is_refused_with_what_to_do(what, words):
+    data, sentence = NO_TEXT[what]
+    with pytest.raises(FileError) as refused:
+        parse_table(data, PATH, ("x_m", "y_m"), words)
+    assert sentence in str(refused.value)
+
+
+def test_a_folder_is_no_table(tmp_path):
+    with pytest.raises(FileError, match="is a folder, expected a file"):
+        load_table(tmp_path, ("x_m",))
 
 
 BAD = {
