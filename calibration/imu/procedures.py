@@ -125,7 +125,7 @@ def temperature_slopes(data: FlightData) -> Outcome:
         CalibrationRefusedError: It is too short, or the temperature changed too little.
     """
     rest = data.at_rest()
-    alive = _alive(rest)
+    alive = _alive(data, rest)
     found = temperature_slope(rest[:, 0], readings_of(rest, alive), rest[:, 4])
     slopes = {
         f"{name}_slope": Quantity(float(found.slope[k]), float(found.slope_sigma[k]), f"{UNITS[name]}/C")
@@ -193,7 +193,7 @@ def rest_of(data: FlightData) -> tuple[ZeroOffset, Alive]:
         CalibrationRefusedError: No channel is alive.
     """
     rest = data.at_rest()
-    alive = _alive(rest)
+    alive = _alive(data, rest)
     found = zero_offset(rest[:, 0], readings_of(rest, alive), rest[:, 4], alive.names)
     return found, alive
 
@@ -208,10 +208,10 @@ def labels_of(alive: Alive) -> list[str]:
     return [f"{name}, {UNITS[name]}".replace("^2", "²") for name in alive.names]
 
 
-def _alive(rest: Array) -> Alive:
+def _alive(data: FlightData, rest: Array) -> Alive:
     if not len(rest):
         raise CalibrationRefusedError("there is no packet of a rest at the start")
-    return alive_channels(rest[:, 1:4])
+    return alive_channels(rest[:, 1:4], data.noise)
 
 
 def _outcome(

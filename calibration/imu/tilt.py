@@ -74,7 +74,7 @@ def rests_of(name: str, data: FlightData, least_s: float, known: TableMap | None
         CalibrationRefusedError: There are too few packets, or a channel is stuck.
     """
     imu, found = data.imu, RestsFound()
-    alive = alive_channels(imu[:, 1:4])
+    alive = alive_channels(imu[:, 1:4], data.noise)
     if alive.complaints:
         raise CalibrationRefusedError("; ".join(alive.complaints))
     finite = imu[np.isfinite(imu[:, 1:4]).all(axis=1)]

@@ -105,7 +105,8 @@ def calibrate_overhead_pose(
         board_height_m: Thickness of the board.
 
     Raises:
-        CalibrationRefusedError: No view, one with too few corners, or views that no camera over the table has.
+        CalibrationRefusedError: No view, one with too few corners, or views that no camera over the
+            table has.
     """
     if not views:
         raise CalibrationRefusedError("the board was found in no picture")

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.imu.channels import complaint_about
 from calibration.outcome import CalibrationRefusedError, Outcome
 from calibration.result import Quantity
 from calibration.sky.delay_fit import CameraDelay, camera_delay
@@ -29,6 +30,7 @@ _LARGEST_SHARE_UNKNOWN = 0.25
 _WELL_KNOWN_S = 0.01
 _LARGEST_RESIDUAL_RAD = 0.1
 _LEAST_DIFFERENT = 0.7
+_EARLY_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,16 +143,19 @@ def delay_from_headings(
         CalibrationRefusedError: Too few headings, a turn that changes too little, or headings that do not
             follow the gyro.
     """
+    complaint = complaint_about(rate_rad_s)
+    if complaint is not None:
+        raise CalibrationRefusedError(f"omega {complaint}")
     turns = _Turns(gyro_t_s, rate_rad_s, arrival_t_s, heading_rad)
     found = turns.search(guess_s, progress)
     if not turns.is_credible(found):
         raise CalibrationRefusedError(turns.doubt(found, guess_s))
     rms = _rms(found)
     sigma_s = math.hypot(found.sigma_s, STAMPS_SIGMA_S)
-    warnings: tuple[str, ...] = ()
-    if found.delay_s < 0.0:
-        warnings = (
-            "the delay is negative: pictures would arrive before they were taken; are the clocks one?",
+    if found.delay_s < -_EARLY_SIGMAS * sigma_s:
+        raise CalibrationRefusedError(
+            f"headings agree best with the gyro {-1e3 * found.delay_s:.0f} ms later, but no picture arrives "
+            "before it is taken: t_arrival_s is of another clock, or the turn repeats itself"
         )
     return Outcome(
         title="Camera delay against the IMU",
@@ -169,5 +174,4 @@ def delay_from_headings(
         draw=partial(
             draw_delay, arrival_t_s[found.used], found.residual_rad, found.rate_rad_s, found.delay_s
         ),
-        warnings=warnings,
     )

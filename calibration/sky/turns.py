@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.flights import read_flight
-from groundstation.data_sets.stamp_words import notes_of
+from groundstation.data_sets.stamp_words import complaint_about_arrivals, notes_of
 from groundstation.declarations.errors import UsageError
 from groundstation.files.errors import FileError
 from groundstation.files.number_tables import load_table
-from groundstation.fusion.stamp_screen import screen_stamps, spacing_of, stretches_of
+from groundstation.fusion.stamp_screen import repeated_rows, screen_stamps, spacing_of, stretches_of
 
 Array = NDArray[np.float64]
 
@@ -65,19 +65,22 @@ def read_turns(source: Path, vehicle: str | None) -> Turns:
     if source.is_dir():
         files = source / "imu.csv", source / "stars.csv"
         table = load_table(files[0], ("t_s", "omega_rad_s"))
-        gyro = table.numbers
+        gyro, lines = table.numbers, table.lines.tolist()
         stars = load_table(files[1], ("t_arrival_s", "heading_rad")).numbers
         spacing_s = spacing_of(gyro[:, 0])
         if not spacing_s < SLOWEST_S:
             raise FileError(f"{files[0]}: t_s rises by {spacing_s:g} from row to row: seconds are expected.")
-        found = screen_stamps(gyro[:, 0], spacing_s)
+        found = screen_stamps(gyro[:, 0], spacing_s, repeated_rows(gyro))
         if found.set_back:
             raise FileError(
-                f"{files[0]}: line {table.lines[found.set_back[0][0]]}, the clock is set back by "
+                f"{files[0]}: line {lines[found.set_back[0][0]]}, the clock is set back by "
                 f"{found.set_back[0][1]:.6g} s: give the part before or after it."
             )
-        notes = notes_of(found, gyro[:, 0], table.lines.tolist(), files[0].name)
+        notes = notes_of(found, gyro[:, 0], lines, files[0].name)
         good = np.isfinite(found.stamp_s)
+        complaint = complaint_about_arrivals(stars[:, 0], gyro[good, 0])
+        if complaint is not None:
+            raise FileError(f"{files[1]}: {complaint}.")
         once = np.unique(stars, axis=0)
         if len(once) < len(stars):
             notes = (*notes, f"{files[1].name}: {len(stars) - len(once)} of {len(stars)} rows came twice")

@@ -141,27 +141,32 @@ def complaint_about_fixes(stars: Array, screened_s: Array) -> str | None:
         stars: (m, 5) exposure, arrival, ...
         screened_s: (n,) of the packets, after the screen.
     """
-    t = screened_s[np.isfinite(screened_s)]
     early = stars[:, 1] < stars[:, 0] - EARLY_S
     if early.sum() > MOST_EARLY * len(stars):
         return (
             f"t_arrival_s is before t_exposure_s in {early.sum()} of {len(stars)} rows: a fix arrives after "
             "its exposure; are the columns interchanged"
         )
-    for column, name in enumerate(("t_exposure_s", "t_arrival_s")):
-        given = stars[np.isfinite(stars[:, column]), column]
-        if len(given) < 2 or ((given > t[0] - 5.0) & (given < t[-1] + 5.0)).any():
-            continue
-        text = (
-            f"no {name} lies within the packets' times, {t[0]:.6g} to {t[-1]:.6g} s: they run from "
-            f"{given.min():.10g} to {given.max():.10g}"
-        )
-        for factor, unit in UNITS.items():
-            span_s = float(np.ptp(given)) / factor
-            if t[0] - 5.0 < float(np.median(given)) / factor < t[-1] + 5.0 and span_s > SPANNED * np.ptp(t):
-                return f"{text}; in {unit}? Seconds of the packets' clock are expected"
-        return f"{text}; by another clock? Seconds of the packets' clock are expected"
-    return None
+    return complaint_about_arrivals(stars[:, 0], screened_s, "t_exposure_s") or complaint_about_arrivals(
+        stars[:, 1], screened_s
+    )
+
+
+def complaint_about_arrivals(given_s: Array, screened_s: Array, name: str = "t_arrival_s") -> str | None:
+    """Return why no stamp of a column (m,) can belong to the packets; None if some can."""
+    t = screened_s[np.isfinite(screened_s)]
+    given = given_s[np.isfinite(given_s)]
+    if len(given) < 2 or not len(t) or ((given > t[0] - 5.0) & (given < t[-1] + 5.0)).any():
+        return None
+    text = (
+        f"no {name} lies within the packets' times, {t[0]:.6g} to {t[-1]:.6g} s: they run from "
+        f"{given.min():.10g} to {given.max():.10g}"
+    )
+    for factor, unit in UNITS.items():
+        span_s = float(np.ptp(given)) / factor
+        if t[0] - 5.0 < float(np.median(given)) / factor < t[-1] + 5.0 and span_s > SPANNED * np.ptp(t):
+            return f"{text}; in {unit}? Seconds of the packets' clock are expected"
+    return f"{text}; by another clock? Seconds of the packets' clock are expected"
 
 
 def notes_of(found: Screened, given_s: Array, lines: Sequence[int], name: str) -> tuple[str, ...]:

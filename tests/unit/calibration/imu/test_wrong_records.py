@@ -381,3 +381,71 @@ def test_an_exposure_that_arrives_again_later_counts_once(spin):
     found = spin.calibrate("gyro-scale")
     assert found["scale"]["std"] == pytest.approx(once["scale"]["std"], rel=1e-9)
     assert f"{len(again)} fixes that came twice" in spin.output
+
+
+def block_twice(rows):
+    quarter = len(rows) // 4
+    return np.concatenate([rows[: 2 * quarter], rows[quarter:]])
+
+
+def file_twice(rows):
+    return np.concatenate([rows, rows])
+
+
+@pytest.mark.parametrize("spoil", [block_twice, file_twice])
+@pytest.mark.parametrize("command", ["zero-offset", "allan"])
+def test_rows_that_were_pasted_twice_count_once(rest, command, spoil):
+    plain = rest.calibrate(command)
+    rest.imu = spoil(rest.imu)
+    found = rest.calibrate(command)
+    for name, quantity in plain.items():
+        if isinstance(quantity, dict) and "std" in quantity:
+            assert found[name] == quantity
+    assert any("those of an earlier line" in note for note in found["set_aside"])
+
+
+@pytest.mark.parametrize("command", ["gyro-scale", "delay"])
+def test_packets_of_turns_that_were_pasted_twice_count_once(spin, command):
+    name = "scale" if command == "gyro-scale" else "delay"
+    plain = spin.calibrate(command)[name]
+    spin.imu = block_twice(spin.imu)
+    assert spin.calibrate(command)[name] == plain
+
+
+@pytest.mark.parametrize(
+    ("channels", "factor", "unit"),
+    [([1], np.degrees(1.0), "deg/s"), ([2, 3], 1.0 / 9.80665, "g"), ([2, 3], 1e3 / 9.80665, "mg")],
+)
+@pytest.mark.parametrize("command", ["zero-offset", "allan"])
+def test_a_channel_in_another_unit_is_told_by_its_noise(rest, command, channels, factor, unit):
+    plain = rest.calibrate(command)
+    rest.imu[:, channels] *= factor
+    found = rest.calibrate(command)
+    wrong = {NAMES[channel - 1] for channel in channels}
+    for name, quantity in plain.items():
+        if isinstance(quantity, dict) and name.split("_")[0] in wrong:
+            assert name not in found
+        elif isinstance(quantity, dict) and "std" in quantity:
+            assert found[name]["value"] == pytest.approx(quantity["value"], abs=0.5 * quantity["std"])
+            assert found[name]["std"] == pytest.approx(quantity["std"], rel=0.15)
+    for name in wrong:
+        assert f"{name} is " in rest.output
+        assert f"as if it were in {unit}: " in rest.output
+
+
+def test_a_delay_of_a_gyro_that_was_at_its_limit_is_refused(laps):
+    laps.imu[:, 1] = np.minimum(laps.imu[:, 1], 0.8 * laps.imu[:, 1].max())
+    with pytest.raises(UsageError, match=r"omega (was stuck|is saturated|reads)"):
+        laps.calibrate("delay")
+
+
+def test_fixes_stamped_in_milliseconds_have_no_delay(laps):
+    laps.stars[:, :2] *= 1e3
+    with pytest.raises(FileError, match=r"no t_arrival_s lies within .* in milliseconds"):
+        laps.calibrate("delay")
+
+
+def test_a_picture_does_not_arrive_before_it_is_taken(laps):
+    laps.stars[:, 1] = laps.stars[:, 0] - 0.3
+    with pytest.raises(UsageError, match="no picture arrives before it is taken"):
+        laps.calibrate("delay")

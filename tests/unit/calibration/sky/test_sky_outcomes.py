@@ -183,8 +183,10 @@ def test_lens_and_mount_come_with_a_camera_a_figure_and_their_provenance(
 
 def test_what_gives_no_calibration_is_refused_in_one_sentence(camera):
     t, arrival = np.arange(0.0, 20.0, 0.01), np.arange(2.0, 18.0, 0.5)
-    with pytest.raises(CalibrationRefusedError, match="changes too little"):
-        delay_from_headings(t, np.zeros(len(t)), arrival, np.zeros(len(arrival)))
+    still = np.random.default_rng(1).normal(0.0, 1e-4, len(t))
+    for rate, words in ((still, "changes too little"), (np.zeros(len(t)), "omega reads 0 in 100 %")):
+        with pytest.raises(CalibrationRefusedError, match=words):
+            delay_from_headings(t, rate, arrival, np.zeros(len(arrival)))
     grey = np.full((48, 64), 128, np.uint8)
     with pytest.raises(CalibrationRefusedError, match="seen in 0 pictures, 5 are needed"):
         lens_from_board([grey] * 3, Board(9, 6, 0.03))
