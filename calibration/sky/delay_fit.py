@@ -97,10 +97,7 @@ def camera_delay(
         used = residual**2 <= np.maximum(_CLIP_SIGMAS**2 * variance, 1e-18)
         weighted = design[used] / variance[used, None]
         normal = design[used].T @ weighted
-        size = np.sqrt(np.diag(normal))
-        if size.min() <= 0.0 or np.linalg.cond(normal / np.outer(size, size)) > _WORST_CONDITION:
-            raise CalibrationRefusedError("the turn rate changes too little to see a delay")
-        change = np.linalg.solve(normal, weighted.T @ residual[used])
+        change = _solved(normal, weighted.T @ residual[used])
         delay, bias, scale = delay + change[0], bias + change[2], scale + change[3]
         offset += change[1] - change[3] * turned.mean()
         if abs(change[0]) < 1e-7:
@@ -121,7 +118,7 @@ def camera_delay(
             noise = fit_noise(times, rate, residual, design, gyro_walk_rad2_s(gyro_t_s, rate_rad_s))
         white, _ = noise.whiten(times, rate, np.column_stack((residual, design)))
         normal = white[:, 1:].T @ white[:, 1:]
-        change = np.linalg.solve(normal, white[:, 1:].T @ white[:, 0])
+        change = _solved(normal, white[:, 1:].T @ white[:, 0])
         delay, bias, scale = delay + change[0], bias + change[1], scale + change[2]
         residual = residual - design @ change
         offset += float(np.mean(residual))
@@ -138,6 +135,18 @@ def camera_delay(
         rate_rad_s=rate,
         used=whole,
     )
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    """The change of the unknowns.
+
+    Raises:
+        CalibrationRefusedError: The turn does not tell them apart.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    if not size.min() > 0.0 or not np.linalg.cond(normal / np.outer(size, size)) < _WORST_CONDITION:
+        raise CalibrationRefusedError("the turn rate changes too little to see a delay")
+    return np.linalg.solve(normal, right)
 
 
 def _variance(residual_rad: Array, rate_rad_s: Array) -> Array:
