@@ -24,6 +24,7 @@ _CLIP_SIGMAS = 4.0
 _STEPS = 20
 _FINAL_STEPS = 3
 _WORST_CONDITION = 1e10
+_NO_TURN = 1e-9
 _MIN_HEADINGS = 10
 
 
@@ -123,6 +124,8 @@ def camera_delay(
         residual = residual - design @ change
         offset += float(np.mean(residual))
         residual = residual - float(np.mean(residual))
+    if abs(scale) < _NO_TURN:
+        raise CalibrationRefusedError("the headings do not turn with the gyro: frozen fixes?")
     whole = np.zeros(len(arrival_t_s), dtype=bool)
     whole[np.flatnonzero(inside)[used]] = True
     return CameraDelay(
