@@ -24,12 +24,14 @@ APART_S = (0.0, 3.0, 9.0)
 """Fixes are compared with the next that is so much later: slow turns show over seconds."""
 LONGEST_PAIR_S = 15.0
 LEAST_PAIRS = 12
-KEPT = 0.8
-"""Share of the pairs that counts: fixes may be wrong."""
+KEPT = 0.75
+"""Share of the pairs that counts: one fix in ten may be wrong, and each is in several pairs."""
 FARTHEST_S, LAG_STEP_S = 30.0, 0.05
 TURNED_SIGMAS = 5.0
 """Of the fixes' difference; with less turning no cause can be told from another."""
 CONTRADICTED_SIGMAS = 3.0
+SCALE_ERROR = 0.05
+"""Of a gyro that nobody has calibrated: so much of a turn is no contradiction."""
 BETTER = 0.4
 """Share of the scatter that is left if the cause is the right one."""
 LEAST_LAG_S = 0.15
@@ -63,7 +65,7 @@ def likely_cause(data: FlightData, lost: Sequence[tuple[float, float]]) -> str |
         lost: From when to when, s.
     """
     data = data.screened()
-    cause = _by_the_turns(data)
+    cause = contradiction_of_turns(data)
     if cause is not None or len(lost) < MANY_LOST:
         return cause
     holes = np.diff(data.imu[np.isfinite(data.imu[:, 0]), 0]) > LONG_GAP_S
@@ -75,7 +77,13 @@ def likely_cause(data: FlightData, lost: Sequence[tuple[float, float]]) -> str |
     )
 
 
-def _by_the_turns(data: FlightData) -> str | None:
+def contradiction_of_turns(data: FlightData) -> str | None:
+    """Return why the vehicle cannot have turned as its gyro and as its fixes tell; None if it can.
+
+    Args:
+        data: Any flight; of little turning nothing is concluded.
+    """
+    data = data.screened()
     packets = data.imu[np.isfinite(data.imu[:, :2]).all(axis=1)]
     fixes = data.stars[np.isfinite(data.stars).all(axis=1)]
     fixes = fixes[np.argsort(fixes[:, 0], kind="stable")]
@@ -86,7 +94,7 @@ def _by_the_turns(data: FlightData) -> str | None:
     turns = _Turns(packets[:, 0], angle, fixes)
     sigma = math.sqrt(2.0) * data.noise.star_sigma_heading_rad
     base = turns.scatter(1.0, 0.0)
-    if not base > CONTRADICTED_SIGMAS * sigma:
+    if not base > max(CONTRADICTED_SIGMAS * sigma, SCALE_ERROR * turns.turned):
         return None
     if not turns.turned > TURNED_SIGMAS * sigma:
         return "the headings turn and the gyro does not: are imu.csv and stars.csv of one flight, in rad"

@@ -145,3 +145,10 @@ def test_tables_that_agree_are_not_accused_for_a_hole(flight):
     assert "lost from" in flight.output
     assert "explain" not in flight.output
     assert "turn" not in flight.output
+
+
+def test_a_gyro_that_nobody_has_calibrated_contradicts_nothing(make_folder, make_flight):
+    flight = make_flight(make_folder(scenario="spin", seed=7, duration_s=60.0))
+    flight.imu[:, 1] *= 1.02
+    flight.run()
+    assert "turn" not in flight.output
