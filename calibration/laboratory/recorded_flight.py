@@ -16,7 +16,6 @@ from groundstation.declarations.rig import Rig
 from groundstation.parts.imu.messages import Imu, ImuBytes
 from groundstation.parts.imu.sections import ImuOfType
 from groundstation.parts.stars.messages import FixBytes, StarFix
-from groundstation.parts.supervision.messages import Faults
 from groundstation.parts.valves.messages import CanOut, ValveStatus
 from groundstation.parts.valves.sections import ValvesOfRig, ValvesOfVehicle
 from groundstation.recording.reader import Recording
@@ -28,8 +27,6 @@ BITRATE = 500_000.0
 LIFTED_S = 0.6
 """So long after the air is on the vehicle surely floats; a touch of the floor is no force of a valve."""
 SHORTEST_S = 5.0
-STUCK = ("valve_stuck_open", "valve_stuck_closed")
-"""Faults with which coils do not tell what valves did."""
 CLOCK_SMOOTHING_S = 10.0
 LINK_LOOKED_AT_NS = 2_000_000_000
 _ALL_USABLE = 7
@@ -88,10 +85,9 @@ def read_flight(recording: Recording, rig: Rig, vehicle: str, camera_delay_s: fl
             with ages of their own.
 
     Raises:
-        CalibrationRefusedError: It did not fly, nothing commanded its valves, or one of them was stuck.
+        CalibrationRefusedError: It did not fly, or nothing commanded its valves.
         RecordingError: The recording is damaged.
     """
-    _check_valves(recording, vehicle)
     imu, afloat = _imu_of(recording, vehicle)
     bus = rig.section(ValvesOfRig).valve_bus
     bitrate = float(bus.get("bitrate", BITRATE)) if isinstance(bus, dict) else BITRATE
@@ -140,18 +136,6 @@ def read_flight(recording: Recording, rig: Rig, vehicle: str, camera_delay_s: fl
         fix_stamp_ns=fixes[:, 1].astype(np.int64),
         fix_pose=fixes[:, 2:],
     )
-
-
-def _check_valves(recording: Recording, vehicle: str) -> None:
-    for message in recording.messages((Faults,), (vehicle,)):
-        payload = message.payload
-        assert isinstance(payload, Faults)
-        for name, detail in zip(payload.ids, payload.details, strict=True):
-            if name in STUCK:
-                raise CalibrationRefusedError(
-                    f"{vehicle} had the fault {name} ({detail}): its valves did not push as commanded; "
-                    "a flight without it is needed"
-                )
 
 
 def _imu_of(recording: Recording, vehicle: str) -> tuple[Array, list[tuple[float, float]]]:

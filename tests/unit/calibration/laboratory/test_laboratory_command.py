@@ -64,16 +64,6 @@ def test_a_float_without_valve_commands_is_refused(run, tmp_path):
     assert "no valve of alpha was ever commanded to open" in refused(run, [path], tmp_path)
 
 
-def test_a_flight_with_a_stuck_valve_is_refused(run, tmp_path):
-    failure = (
-        '[[laboratory.failures]]\nkind = "stuck_open_valve"\nvehicle = "alpha"\nparameters = { valve = 3 }\n'
-        "start_s = 10.0\nend_s = 14.0\n"
-    )
-    text = RIG.read_text() + f"[mock_ups.standard.fusion]\nrest_s = 0.5\n{failure}"
-    path = record(tmp_path / "stuck.mcap", 15.0, text)
-    assert "alpha had the fault valve_stuck_open (valve 3 " in refused(run, [path], tmp_path)
-
-
 def test_a_recording_of_a_killed_recorder_is_refused(run, rest, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(rest.read_bytes()[:-20_000])
