@@ -194,7 +194,8 @@ class Slot:
         if kind not in self.node.outputs:
             raise NodeError(f"{self.key} published {kind.__name__}, which is not among its outputs")
         topic, vehicle, vehicles = kind.TOPIC, payload.vehicle, self.vehicles
-        if topic.scope is Scope.VEHICLE and vehicles is not None and vehicle not in vehicles:
+        is_own = vehicle == self.node.vehicle  # empty for what a node of the rig states of itself
+        if topic.scope is Scope.VEHICLE and vehicles is not None and not is_own and vehicle not in vehicles:
             raise NodeError(
                 f"{self.key} published {topic.noun} of a vehicle {vehicle!r:.80}, "
                 f"which the rig does not have (it has {', '.join(vehicles)})"
