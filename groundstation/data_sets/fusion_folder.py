@@ -20,8 +20,11 @@ from groundstation.data_sets.stamp_words import (
     notes_of,
 )
 from groundstation.data_sets.value_words import (
+    complaint_about_columns,
+    complaint_about_dead_channels,
     complaint_about_places,
     complaint_about_readings,
+    complaint_about_scatter,
     complaint_about_temperatures,
     notes_of_still_channels,
     without_wild_temperatures,
@@ -66,12 +69,14 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     _refuse(path, complaint_about_temperatures(imu[:, 4]))
     if with_stars:  # a rest alone has its channels judged one by one
         _refuse(path, complaint_about_readings(imu, noise))
+        _refuse(path, complaint_about_dead_channels(imu, noise))
     imu[:, 4], notes = without_wild_temperatures(imu[:, 4], table.lines.tolist(), path.name)
     notes += notes_of_still_channels(imu, path.name)
     stars = np.empty((0, len(STAR_COLUMNS)))
     if with_stars:
         stars = load_table(folder / "stars.csv", STAR_COLUMNS, is_finite=False).numbers
         _refuse(folder / "stars.csv", complaint_about_places(stars))
+        _refuse(folder / "stars.csv", complaint_about_columns(stars))
     variance = [noise.star_sigma_xy_m**2, noise.star_sigma_xy_m**2, noise.star_sigma_heading_rad**2]
     covariance = np.tile(np.diag(variance), (len(stars), 1, 1))
     given = FlightData(imu, stars, covariance, known["run_start_s"], noise, notes=notes)
@@ -85,6 +90,7 @@ def read_folder(folder: Path, *, with_stars: bool = True) -> FlightData:
     _refuse(path, complaint_about_start(stamp_s, known["duration_s"]))
     _refuse(path, complaint_about_rate(stamp_s, period_s))
     _refuse(folder / "stars.csv", complaint_about_fixes(data.stars, stamp_s))
+    _refuse(folder / "stars.csv", complaint_about_scatter(data.stars, known["run_start_s"], noise))
     return data
 
 

@@ -79,7 +79,7 @@ def complaint_about_bunches(imu: Array, period_s: float) -> str | None:
     if len(imu) < LEAST_ROWS:
         return None
     same = np.diff(imu[:, 0]) == 0.0
-    other = same & (np.diff(imu[:, 1:], axis=0) != 0.0).any(axis=1)
+    other = same & (imu[1:, 1:] != imu[:-1, 1:]).any(axis=1)
     if other.mean() <= MOST_EQUAL:
         return None
     size = 1.0 / max(1.0 - float(other.mean()), 1.0 / len(imu))
@@ -182,7 +182,12 @@ def notes_of(found: Screened, given_s: Array, lines: Sequence[int], name: str) -
         )
     for row, back_s in found.set_back[:NAMED]:
         notes.append(
-            f"{name}: line {lines[row]}, the clock is set back by {back_s:.6g} s; seconds are counted on"
+            f"{name}: line {lines[row]}, the clock is set back by {back_s:.6g} s; "
+            + (
+                "another session? Nothing is carried over from the one before"
+                if row in found.starts
+                else "seconds are counted on"
+            )
         )
     return tuple(notes)
 

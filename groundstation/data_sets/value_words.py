@@ -18,6 +18,14 @@ CHIP_C = (-60.0, 150.0)
 """What a sensor can report of itself, with room."""
 NAMED = 3
 LEAST_PACKETS = 20
+MOST_WILD = 0.3
+"""Share of packets that are no readings of a channel; with more it is dead, or in another unit."""
+MOST_EQUAL = 0.5
+"""Share of fixes with one value in a column."""
+LEAST_FIXES = 6
+POSE = ("x_m", "y_m", "heading_rad")
+MOST_SCATTER = 20.0
+"""Times by which the scatter of resting fixes may differ from what is stated of it."""
 TINY = 1e-12
 SCATTER_TOLERANCE = 1.8
 """Times by which a healthy sensor's scatter may differ from what is stated of it."""
@@ -70,6 +78,70 @@ def complaint_about_readings(imu: Array, noise: NoiseModel) -> str | None:
                     f"{name} scatters {times:.3g} times as much from packet to packet as the noise in the "
                     f"known block of meta.json: in {unit}? {expected} are expected"
                 )
+    return None
+
+
+def complaint_about_dead_channels(imu: Array, noise: NoiseModel) -> str | None:
+    """Return which channel gives no readings; None if all of them mostly do.
+
+    Args:
+        imu: (n, 5) stamp, rate, ax, ay, temperature, as given.
+        noise: Says where the sensors' scales end.
+    """
+    for column, (name, _, _) in CHANNELS.items():
+        most = noise.full_scale_rad_s if column == 1 else noise.full_scale_m_s2
+        with np.errstate(invalid="ignore"):
+            wild = 1.0 - float((np.abs(imu[:, column]) <= most).mean())
+        if wild > MOST_WILD:
+            return (
+                f"{name} is no number, or beyond the {most:g} at which the sensor's scale ends, in "
+                f"{100.0 * wild:.0f} % of the packets: nothing can be estimated without it"
+            )
+    return None
+
+
+def complaint_about_columns(stars: Array) -> str | None:
+    """Return which column of the fixes is none, or stands still while others move; None if all can be read.
+
+    Args:
+        stars: (m, 5) exposure, arrival, x, y, heading.
+    """
+    if len(stars) < LEAST_FIXES:
+        return None
+    shares = {}
+    for name, values in zip(("t_exposure_s", "t_arrival_s", *POSE), stars.T, strict=True):
+        known = values[np.isfinite(values)]
+        if len(known) < MOST_EQUAL * len(values):
+            return f"{name} is no number in {len(values) - len(known)} of {len(values)} rows"
+        shares[name] = float(np.unique(known, return_counts=True)[1].max()) / len(values)
+    for name, share in shares.items():
+        if share > MOST_EQUAL > min(shares[each] for each in (POSE if name in POSE else shares)):
+            return f"{name} is the same in {100.0 * share:.0f} % of the rows, though others change: frozen"
+    return None
+
+
+def complaint_about_scatter(stars: Array, run_start_s: float, noise: NoiseModel) -> str | None:
+    """Return why the places of the resting fixes contradict their stated sigma; None if they do not.
+
+    Args:
+        stars: (m, 5) exposure, arrival, x, y, heading.
+        run_start_s: Until then the vehicle rests, as the folder states it.
+        noise: Likewise.
+    """
+    rest = stars[(stars[:, 0] <= run_start_s) & np.isfinite(stars).all(axis=1)]
+    if len(rest) < LEAST_FIXES:
+        return None
+    sigma_m = noise.star_sigma_xy_m
+    off_m = np.abs(rest[:, 2:4] - np.median(rest[:, 2:4], axis=0))
+    scatter_m = 1.4826 * float(np.median(off_m, axis=0).max())
+    text = (
+        f"the {len(rest)} fixes of the rest, until known.run_start_s = {run_start_s:g}, scatter by "
+        f"{scatter_m:.2g} m, but known.star_sigma_xy_m of meta.json is {sigma_m:g}"
+    )
+    if scatter_m > MOST_SCATTER * sigma_m:
+        return f"{text}: one of them is in another unit, or the vehicle did not rest"
+    if 0.0 < scatter_m < sigma_m / MOST_SCATTER:
+        return f"{text}: one of them is in another unit"
     return None
 
 

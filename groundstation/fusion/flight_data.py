@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.fusion.estimator import Estimator, Fix, FixOutcome, ImuPacket, PlanarState
+from groundstation.fusion.fix_repeats import REPEATS, repeated_fixes
 from groundstation.fusion.noise import NoiseModel
 from groundstation.fusion.stamp_screen import LARGEST_S, Screened, repeated_rows, screen_stamps, set_back_at
 from groundstation.fusion.stamp_ticks import StampTicks
@@ -23,6 +24,10 @@ PAUSE_S = 60.0
 REFERENCE_COLUMNS = 7
 FIX_ROWS = 5
 """Before and after, by which it is judged whether the fixes' clock was set back, too."""
+START_S, START_SHARE = 1.0, 0.1
+"""A clock that falls back to this much after its begin, and of its run, is begun anew."""
+UNKNOWN_S = 2.0 * PAUSE_S
+"""What is counted for the time before a clock that began anew, as nobody knows it."""
 EARLY_S = 1e-3
 """So much earlier than its exposure a fix may arrive: rounding."""
 
@@ -69,7 +74,11 @@ class FlightData:
         """
         if self.given_s is not None:
             return self
-        found = screen_stamps(self.imu[:, 0], self.noise.packet_period_s, repeated_rows(self.imu))
+        found = _parted(
+            screen_stamps(self.imu[:, 0], self.noise.packet_period_s, repeated_rows(self.imu)),
+            self.imu[:, 0],
+            self.stars,
+        )
         imu = self.imu.copy()
         imu[:, 0] = found.stamp_s
         odd = {reason: len(rows) for reason, rows in found.aside.items()}
@@ -85,10 +94,7 @@ class FlightData:
         imu = flight.imu[np.isfinite(flight.imu[:, 0])]
         order = np.argsort(flight.stars[:, 1], kind="stable")
         stars, covariance = flight.stars[order], flight.covariance[order]
-        _, first = np.unique(stars[:, [0, 2, 3, 4]], axis=0, return_index=True)
-        once = np.zeros(len(stars), dtype=np.bool_)
-        once[first] = True
-        once &= np.isfinite(stars).all(axis=1)
+        once = np.isfinite(stars).all(axis=1) & ~repeated_fixes(stars, self.noise)
         notes = flight.notes
         if len(stars) > once.sum():
             notes = (
@@ -98,6 +104,29 @@ class FlightData:
         return replace(
             flight, imu=imu, stars=stars[once], covariance=covariance[once], given_s=imu[:, 0], notes=notes
         )
+
+
+def _parted(found: Screened, given_s: Array, stars: Array) -> Screened:
+    """Return the stamps with a pause before each start of the clock, where the fixes' clock began anew, too.
+
+    A clock that falls back to its beginning is that of another session: nobody knows what went on between.
+    If the fixes ran on, so did the flight.
+    """
+    if not found.set_back or _ran_on(stars, max(given_s[row] + back_s for row, back_s in found.set_back)):
+        return found
+    begun_s = float(given_s[np.isfinite(found.stamp_s)][0])
+    stamp_s, starts = found.stamp_s.copy(), []
+    for row, back_s in found.set_back:
+        ran_s, fell_to_s = given_s[row] + back_s - begun_s, given_s[row] - begun_s
+        if fell_to_s < START_S + START_SHARE * ran_s:
+            stamp_s[row:] += UNKNOWN_S
+            starts.append(row)
+    return replace(found, stamp_s=stamp_s, starts=tuple(starts))
+
+
+def _ran_on(stars: Array, newest_s: float) -> bool:
+    """Whether fixes, in the order of their file, go on where the packets' clock began anew."""
+    return len(set_back_at(stars[:, 1], FIX_ROWS)) == 0 and bool((stars[:, 1] > newest_s).any())
 
 
 def _with_the_clock(stars: Array, found: Screened, given_s: Array) -> Array:
@@ -134,6 +163,7 @@ def estimate(
         estimator.counters.add(name, count)
     ticks = StampTicks(data.noise.packet_period_s)
     order = np.argsort(data.stars[:, 1], kind="stable")  # a stamp that is no number comes last
+    is_again = repeated_fixes(data.stars[order], data.noise).tolist()
     stars, covariance, next_fix = data.stars[order].tolist(), data.covariance[order], 0
     accounts: list[FixOutcome] = []
     states: list[PlanarState | None] = []
@@ -147,7 +177,11 @@ def estimate(
             states.append(None)
             continue
         while next_fix < len(stars) and stars[next_fix][1] <= t:
-            accounts.append(_add_fix(estimator, stars[next_fix], covariance[next_fix]))
+            if is_again[next_fix]:
+                estimator.counters.add("fix_" + REPEATS.replace(" ", "_"))
+                accounts.append(_refused(stars[next_fix], REPEATS))
+            else:
+                accounts.append(_add_fix(estimator, stars[next_fix], covariance[next_fix]))
             next_fix += 1
         if resting and t > data.run_start_s:
             estimator.end_rest(round(max(before_s, data.run_start_s) * NS))
@@ -167,10 +201,11 @@ def estimate(
 
 
 def lost_spans(data: FlightData, states: list[PlanarState | None]) -> list[tuple[float, float]]:
-    """Return between which moments, s of the packets' clock, an estimator called itself lost."""
+    """Return between which moments, s as the packets' file gives them, an estimator called itself lost."""
     spans: list[tuple[float, float]] = []
     was_lost = False
-    for t, state in zip(data.imu[:, 0].tolist(), states, strict=True):
+    given_s = data.imu[:, 0] if data.given_s is None else data.given_s
+    for t, state in zip(given_s.tolist(), states, strict=True):
         if state is None:
             continue
         if state.is_lost:

@@ -44,11 +44,13 @@ class Screened:
         stamp_s: (n,) of one clock that rises, s; NaN where a row was set aside.
         aside: Rows that were set aside, by reason (a counter's name).
         set_back: Rows at which the clock was set back, and by how much, s.
+        starts: Those of them at which it began anew, an unknown time later.
     """
 
     stamp_s: Array
     aside: dict[str, NDArray[np.intp]]
     set_back: tuple[tuple[int, float], ...]
+    starts: tuple[int, ...] = ()
 
 
 def stretches_of(stamp_s: Array, hole_s: float) -> list[NDArray[np.intp]]:
