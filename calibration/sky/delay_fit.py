@@ -149,7 +149,7 @@ def _solved(normal: Array, right: Array) -> Array:
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     if not size.min() > 0.0 or not np.linalg.cond(normal / np.outer(size, size)) < _WORST_CONDITION:
         raise CalibrationRefusedError("the turn rate changes too little to see a delay")
-    return np.linalg.solve(normal, right)
+    return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
 
 
 def _variance(residual_rad: Array, rate_rad_s: Array) -> Array:

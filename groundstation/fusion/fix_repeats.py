@@ -46,7 +46,7 @@ def repeated_fixes(stars: NDArray[np.float64], noise: NoiseModel) -> NDArray[np.
     is_again = np.zeros(len(stars), dtype=np.bool_)
     columns = [0, 2, 3, 4] if _is_coarse(stars, noise) else [2, 3, 4]
     known = np.flatnonzero(np.isfinite(stars[:, columns]).all(axis=1))
-    _, first = np.unique(stars[np.ix_(known, columns)], axis=0, return_index=True)
+    _, first = np.unique(stars[known][:, columns], axis=0, return_index=True)
     is_again[np.delete(known, first)] = True
     return is_again
 
